@@ -1,0 +1,199 @@
+"""CSV: one header row with the column names, then one row of numbers per sample, separated by commas."""
+
+import csv
+import io
+from collections.abc import Collection
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import RecordingError
+from sea_ident.recordings.arrays import RawTable
+from sea_ident.recordings.naming import TIME, dimension_of
+from sea_ident.recordings.recording import Recording
+
+LONGEST_HEADER = 1_000_000
+"""Characters in the header row."""
+
+MOST_COLUMNS = 10_000
+"""Columns in any file."""
+
+_ROWS_AT_ONCE = 8192
+
+
+def read_csv(path: Path, names: Collection[str] | None) -> RawTable:
+    """Read the columns of a CSV file.
+
+    A byte-order mark, CRLF line ends, blank lines, quotes and lines that start with # before the header are
+    fine.
+
+    Args:
+        path: The file.
+        names: Columns wanted besides those that bear a name of the project; all if None.
+
+    Returns:
+        The table.
+
+    Raises:
+        RecordingError: not a CSV file with a header of names and rows of numbers; says the line and column.
+    """
+    text = _decode(path)
+    header, start, first_line = _header(text, path)
+    wanted = [i for i, name in enumerate(header) if names is None or name in names or dimension_of(name)]
+    if not wanted:
+        raise RecordingError(f"{path}: none of the columns asked for; there are: {', '.join(header)}")
+    if not text[start:].strip():
+        raise RecordingError(f"{path}: a header, but no rows of numbers")
+    table = None
+    # Cells are counted before parsing: with usecols a row with too many would pass unseen.
+    if '"' not in text and "\r" not in text and _rectangular(text, start, len(header)):
+        with suppress(ValueError), open(path, encoding="utf-8-sig") as file:
+            table = np.loadtxt(
+                file,
+                delimiter=",",
+                skiprows=first_line - 1,
+                comments=None,
+                ndmin=2,
+                usecols=None if len(wanted) == len(header) else wanted,
+            )
+    if table is None:
+        table = _parse_slowly(text[start:], header, wanted, first_line, path)
+    columns = {header[i]: table[:, k] for k, i in enumerate(wanted)}
+    return RawTable(columns, tuple(name for name in header if name not in columns))
+
+
+def write_csv(recording: Recording, path: Path) -> None:
+    """Write a recording; every number is the shortest text that reads back as the same number.
+
+    Args:
+        recording: What to write.
+        path: File to be created.
+    """
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerow([TIME, *recording.columns])
+        table = np.column_stack([recording.time, *recording.columns.values()])
+        for start in range(0, len(table), _ROWS_AT_ONCE):
+            rows = table[start : start + _ROWS_AT_ONCE].tolist()
+            file.write("\n".join([",".join(map(repr, row)) for row in rows]) + "\n")
+
+
+def _decode(path: Path) -> str:
+    data = path.read_bytes()
+    if not data:
+        raise RecordingError(f"{path}: the file is empty")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise RecordingError(f"{path}: the text is UTF-16; save it as UTF-8")
+    if b"\0" in data:
+        raise RecordingError(f"{path}: holds binary data (a zero byte at {data.index(0)}); is it a CSV file?")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise RecordingError(
+            f"{path}, line {line}: byte 0x{data[error.start]:02x} at {error.start} is not UTF-8 text; "
+            "is it a CSV file? If so, save it as UTF-8"
+        ) from error
+    return text.replace("\r\n", "\n") if "\r\n" in text else text
+
+
+def _header(text: str, path: Path) -> tuple[list[str], int, int]:
+    """Column names, where the rows start, and the number of the line after the header."""
+    start, line = 0, 1
+    while True:
+        end = text.find("\n", start)
+        end = len(text) if end < 0 else end
+        row = text[start:end].strip()
+        if row and not row.startswith("#"):
+            break
+        if end == len(text):
+            raise RecordingError(f"{path}: no header row with column names")
+        start, line = end + 1, line + 1
+    if len(row) > LONGEST_HEADER:
+        raise RecordingError(f"{path}, line {line}: a header row of {len(row)} characters; is it a CSV file?")
+    try:
+        header = [name.strip() for name in next(csv.reader([row], strict=True))]
+    except csv.Error as error:
+        raise RecordingError(f"{path}, line {line}: the header row cannot be read: {error}") from error
+    _check_header(header, row, line, path)
+    return header, min(end + 1, len(text)), line + 1
+
+
+def _check_header(header: list[str], row: str, line: int, path: Path) -> None:
+    where = f"{path}, line {line}"
+    if len(header) == 1:
+        for delimiter, name in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
+            if delimiter in row:
+                raise RecordingError(
+                    f"{where}: the columns are separated by {name}; commas are needed (and decimal points). "
+                    f"Export again, or replace {delimiter!r} by ','"
+                )
+    if len(header) > MOST_COLUMNS:
+        raise RecordingError(f"{where}: {len(header)} columns; at most {MOST_COLUMNS} are read")
+    if all(_is_number(name) for name in header):
+        raise RecordingError(f"{where}: numbers instead of column names; add a header row such as time,q_hip")
+    if len(header) == 1:
+        raise RecordingError(f"{where}: only one column, {header[0][:60]!r}; time and at least one are needed")
+    seen: dict[str, int] = {}
+    for i, name in enumerate(header):
+        if not name:
+            raise RecordingError(f"{where}: column {i + 1} of {len(header)} has no name")
+        if name in seen:
+            raise RecordingError(f"{where}: column {name!r} twice, as number {seen[name] + 1} and {i + 1}")
+        seen[name] = i
+
+
+def _rectangular(text: str, start: int, width: int) -> bool:
+    """Whether the number of commas fits; a cheap check that finds nearly all ragged rows."""
+    rows = text.count("\n", start) + (not text.endswith("\n"))
+    return text.count(",", start) == rows * (width - 1)
+
+
+def _parse_slowly(body: str, header: list[str], wanted: list[int], line: int, path: Path) -> FloatArray:
+    """Parse cell by cell, to handle quotes and to say exactly what is wrong where."""
+    rows: list[list[float]] = []
+    reader = csv.reader(io.StringIO(body), strict=True)
+    try:
+        for cells in reader:
+            if not cells or (len(cells) == 1 and not cells[0].strip()):
+                continue
+            where = f"{path}, line {line + reader.line_num - 1}"
+            if len(cells) != len(header):
+                raise RecordingError(_ragged(cells, header, where))
+            rows.append([_number(cells[i], header[i], where) for i in wanted])
+    except csv.Error as error:
+        raise RecordingError(f"{path}, line {line + reader.line_num - 1}: cannot be read: {error}") from error
+    if not rows:
+        raise RecordingError(f"{path}: a header, but no rows of numbers")
+    return np.array(rows, dtype=np.float64)
+
+
+def _ragged(cells: list[str], header: list[str], where: str) -> str:
+    message = f"{where}: {len(cells)} cells, but the header names {len(header)} columns"
+    if len(cells) > len(header):
+        return message + "; are there decimal commas? Numbers need a decimal point"
+    return message + "; is the file cut off here?"
+
+
+def _number(cell: str, name: str, where: str) -> float:
+    text = cell.strip()
+    if not text:
+        raise RecordingError(
+            f"{where}: column {name} is empty. Nothing is filled in: cut the recording, or, if columns have "
+            "clocks of their own, write them to a format with columns of different length (NPZ, MAT, HDF5)"
+        )
+    if not _is_number(text):
+        raise RecordingError(f"{where}: column {name} holds {text[:60]!r} instead of a number")
+    return float(text)
+
+
+def _is_number(text: str) -> bool:
+    # float() also takes 1_000 and digits of other scripts, which no other reader of CSV does.
+    if "_" in text or not text.isascii():
+        return False
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
