@@ -1,0 +1,212 @@
+"""Base parameters: the combinations of parameters that motion and torque can tell."""
+
+import warnings as python_warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from sea_ident._typing import FloatArray, IntArray
+from sea_ident.effects import Column, Effect
+from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.motion import Motion
+from sea_ident.regressor import build_regressor, model_columns
+from sea_ident.robot import Robot
+
+# Among equally informative columns the pivoting should keep those that the literature names: first moments before
+# moments of inertia before masses. The factors only order the pivots; they are far from the rank decision.
+_PREFERENCE = {"m": 0.25, "Ixx": 0.5, "Ixy": 0.5, "Iyy": 0.4, "Ixz": 0.5, "Iyz": 0.5}
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """Base parameters as a matrix: ``psi_base = grouping @ psi``; names are labels.
+
+    Attributes:
+        columns: (p,) all columns of the model.
+        independent: (b,) indices of the columns that carry the base parameters.
+        grouping: (b, p) how every parameter enters the base parameters; identity at `independent`.
+        singular_values: (p,) of the column-normalised stacked regressor.
+        tolerance: singular values below ``tolerance * largest`` count as zero.
+        warnings: findings, such as a rank that hangs on the tolerance.
+    """
+
+    columns: tuple[Column, ...]
+    independent: IntArray
+    grouping: FloatArray
+    singular_values: FloatArray
+    tolerance: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def rank(self) -> int:
+        """Number b of base parameters."""
+        return len(self.independent)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(b,) names: that of the independent column, with a `*` where other parameters are grouped into it."""
+        grouped = np.count_nonzero(self.grouping, axis=1) > 1
+        return tuple(self.columns[k].name + ("*" if g else "") for k, g in zip(self.independent, grouped, strict=True))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """(b,) units."""
+        return tuple(self.columns[k].unit for k in self.independent)
+
+    @property
+    def gap(self) -> float:
+        """Smallest kept over largest rejected singular value; infinite where nothing is rejected."""
+        if self.rank == len(self.columns):
+            return float("inf")
+        rejected = float(self.singular_values[self.rank])
+        return float(self.singular_values[self.rank - 1]) / rejected if rejected > 0.0 else float("inf")
+
+    def combination(self, index: int) -> dict[str, float]:
+        """Parameters and coefficients that make up one base parameter."""
+        row = self.grouping[index]
+        order = [
+            int(self.independent[index]),
+            *(int(k) for k in np.flatnonzero(row) if k != self.independent[index]),
+        ]
+        return {self.columns[k].name: float(row[k]) for k in order}
+
+    def project(self, parameters: FloatArray) -> FloatArray:
+        """(b,) base parameters of (p,) parameters; NaN where a parameter that enters is NaN."""
+        values: FloatArray = np.where(self.grouping != 0.0, self.grouping * parameters, 0.0).sum(axis=1)
+        return values
+
+    def summary(self) -> str:
+        """One line per base parameter."""
+        lines = [
+            f"{self.rank} base parameters of {len(self.columns)}; singular values {self.singular_values[0]:.3g} .. "
+            f"{self.singular_values[self.rank - 1]:.3g}, then a gap of {self.gap:.2g}"
+        ]
+        for k in range(self.rank):
+            terms = [f"{c:+.4g} {name}" for name, c in self.combination(k).items()]
+            lines.append("  " + " ".join(terms).removeprefix("+1 "))
+        lines.extend(f"  warning: {text}" for text in self.warnings)
+        return "\n".join(lines)
+
+
+def random_motion(robot: Robot, samples: int, seed: int = 0) -> Motion:
+    """Independent random states of links and motors, for identities and ranks.
+
+    Positions are spread over the limits (at least 1 rad or m wide, at most 2 pi), so that narrow joints do not hide
+    what geometry makes visible.
+
+    Args:
+        robot: the robot.
+        samples: N.
+        seed: of the random numbers.
+
+    Returns:
+        (N, n) motion; theta is independent of q at elastic joints and equal to it at rigid ones.
+    """
+    rng = np.random.default_rng(seed)
+    lower, upper = robot.limits.lower, robot.limits.upper
+    finite = np.isfinite(lower) & np.isfinite(upper)
+    centre = np.where(finite, (np.where(finite, lower, 0.0) + np.where(finite, upper, 0.0)) / 2.0, 0.0)
+    width = np.clip(
+        np.where(finite, np.where(finite, upper, 0.0) - np.where(finite, lower, 0.0), 2 * np.pi),
+        1.0,
+        2 * np.pi,
+    )
+    q = centre + width * rng.uniform(-0.5, 0.5, (samples, robot.n))
+    dq, ddq, dtheta, ddtheta = (rng.uniform(-3.0, 3.0, (samples, robot.n)) for _ in range(4))
+    theta = q + rng.uniform(-0.5, 0.5, (samples, robot.n))
+    elastic = np.array(robot.elastic, dtype=bool)
+    return Motion(
+        np.arange(samples, dtype=float), q, dq, ddq,
+        np.where(elastic, theta, q), np.where(elastic, dtheta, dq), np.where(elastic, ddtheta, ddq),
+    )  # fmt: skip
+
+
+def find_base_parameters(
+    robot: Robot,
+    effects: Sequence[Effect],
+    motion: Motion | None = None,
+    *,
+    seed: int = 0,
+    tolerance: float = 1e-9,
+) -> BaseParameters:
+    """Find the base parameters of a model: QR with column pivoting, with the singular values as the judge.
+
+    Args:
+        robot: the robot.
+        effects: the model.
+        motion: motion that decides what is visible; random states by default (structural rank).
+        seed: of the random states.
+        tolerance: singular values below this fraction of the largest count as zero.
+
+    Returns:
+        The base parameters.
+
+    Raises:
+        SeaIdentError: if the model has no column that moves anything.
+
+    References:
+        Gautier, Numerical calculation of the base inertial parameters of robots, J. Robotic Systems, 1991.
+    """
+    columns = model_columns(robot, effects)
+    if motion is None:
+        motion = random_motion(robot, max(40, 4 * (len(columns) // robot.n + 1)), seed)
+    triangle = np.zeros((0, len(columns)))
+    for part in motion.chunks(500):
+        rows = build_regressor(robot, effects, part).sum.reshape(-1, len(columns))
+        triangle = scipy.linalg.qr(np.vstack([triangle, rows]), mode="r", check_finite=False)[0][: len(columns)]
+    return group_columns(columns, triangle, tolerance)
+
+
+def group_columns(columns: tuple[Column, ...], triangle: FloatArray, tolerance: float = 1e-9) -> BaseParameters:
+    """Group the columns of a stacked regressor.
+
+    Args:
+        columns: (p,) labels.
+        triangle: (r, p) the stacked regressor, or the triangular factor of its QR decomposition.
+        tolerance: singular values below this fraction of the largest count as zero.
+
+    Returns:
+        The base parameters.
+
+    Raises:
+        SeaIdentError: if all columns are zero.
+    """
+    norms = np.linalg.norm(triangle, axis=0)
+    visible = norms > tolerance * max(float(norms.max(initial=0.0)), 1e-300)
+    if not np.any(visible):
+        raise SeaIdentError("no parameter has any influence on the torque: the motion is at rest without gravity")
+    scale = np.where(visible, norms, np.inf)
+    normalised = triangle / scale
+    singular_values = np.zeros(len(columns))
+    found = np.linalg.svd(normalised, compute_uv=False)
+    singular_values[: len(found)] = found
+    rank = int(np.count_nonzero(singular_values > tolerance * singular_values[0]))
+
+    preference = np.array([_PREFERENCE.get(column.name.rpartition(".")[2], 1.0) for column in columns])
+    _, upper, pivots = scipy.linalg.qr(normalised * preference, mode="economic", pivoting=True)
+    kept, rejected = pivots[:rank], pivots[rank:]
+    # columns rejected = columns kept @ relation, in the units of the parameters
+    relation = scipy.linalg.solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
+    kept_scale = scale[kept] * 1.0 / preference[kept]
+    rejected_scale = np.where(visible[rejected], scale[rejected] / preference[rejected], 0.0)
+    relation = relation / kept_scale[:, None] * rejected_scale
+    # what is zero but for rounding, judged in the normalised columns
+    significance = np.abs(relation) * norms[kept][:, None]
+    relation[significance <= 1e-8 * np.maximum(norms[rejected], 1e-300)] = 0.0
+    order = np.argsort(kept)
+    grouping = np.zeros((rank, len(columns)))
+    grouping[np.arange(rank), kept[order]] = 1.0
+    grouping[:, rejected] = relation[order]
+
+    notes: list[str] = []
+    base = BaseParameters(columns, kept[order].astype(np.intp), grouping, singular_values, tolerance)
+    if base.gap < 10.0:
+        text = (
+            f"the rank {rank} hangs on the tolerance: the singular values {singular_values[rank - 1]:.3g} and "
+            f"{singular_values[rank]:.3g} beside it are less than a decade apart"
+        )
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+        notes.append(text)
+    return BaseParameters(base.columns, base.independent, grouping, singular_values, tolerance, tuple(notes))

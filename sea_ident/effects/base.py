@@ -1,0 +1,284 @@
+"""What an effect is.
+
+An effect is one physical cause. It declares the columns that it adds to the regressor, computes them from the state
+of the robot, and can act in a simulation. Rigid bodies, rotors and friction are effects like any other.
+
+Rows: a joint has a link row and a motor row (paper, eqs. 1-2), written so that
+
+    link   sum of columns x parameters = 0           (the spring enters with a minus sign)
+    motor  sum of columns x parameters = tau_motor   (the spring enters with a plus sign)
+
+and their sum is the row of a rigid joint, in which the spring cancels (paper, eq. 4).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import EffectError
+from sea_ident.motion import Motion
+from sea_ident.robot import Robot
+
+
+class Side(StrEnum):
+    """Where an effect enters."""
+
+    LINK = "link"
+    MOTOR = "motor"
+    SPRING = "spring"
+    BOTH = "both"
+    SENSOR = "sensor"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the regressor, which always carries its name.
+
+    Attributes:
+        name: name of its parameter, unique within a model.
+        unit: unit of its parameter.
+        effect: name of the effect that adds it.
+        joint: joint that it belongs to, None where it belongs to no single joint.
+        side: where it enters.
+        nonnegative: whether a negative value is physically impossible.
+    """
+
+    name: str
+    unit: str
+    effect: str
+    joint: str | None
+    side: Side
+    nonnegative: bool = False
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A parameter that enters nonlinearly.
+
+    Attributes:
+        name: name of the attribute of the effect.
+        unit: unit.
+        lower: smallest value that makes physical sense.
+        upper: largest value that makes physical sense.
+        logarithmic: whether a search should step by factors rather than differences.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    logarithmic: bool = True
+
+    def grid(self, points: int) -> FloatArray:
+        """(points,) values from `lower` to `upper`."""
+        if self.logarithmic:
+            return np.geomspace(self.lower, self.upper, points)
+        return np.linspace(self.lower, self.upper, points)
+
+
+@dataclass(frozen=True, eq=False)
+class Contribution:
+    """Columns of one effect.
+
+    Attributes:
+        link: (N, n, k) part in the link rows.
+        motor: (N, n, k) part in the motor rows.
+    """
+
+    link: FloatArray
+    motor: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A robot in a motion: what effects compute their columns from, with the costly parts computed once.
+
+    Attributes:
+        robot: the robot.
+        motion: (N, n) motion.
+        channels: further measured signals (N, n) by kind, for effects that need them (temperature, tau_spring).
+    """
+
+    robot: Robot
+    motion: Motion
+    channels: Mapping[str, FloatArray] | None = None
+
+    @cached_property
+    def extended_regressor(self) -> FloatArray:
+        """(N, nv, 10 bodies) regressor of links and rotors as bodies of one tree."""
+        robot, motion = self.robot, self.motion
+        model = robot.extended_model
+        data = model.createData()
+        x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
+        v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
+        a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))
+        out = np.empty((len(motion), model.nv, 10 * (model.njoints - 1)))
+        compute = pin.computeJointTorqueRegressor
+        for k in range(len(motion)):
+            out[k] = compute(model, data, x[k], v[k], a[k])
+        return out
+
+    def rows(self, extended: FloatArray) -> Contribution:
+        """Link and motor rows of (N, nv, k) columns of the extended model."""
+        return Contribution(
+            np.matmul(self.robot.link_map.T, extended),
+            np.matmul(self.robot.motor_map.T, extended),
+        )
+
+    def at(self, side: Side, joint: str, columns: FloatArray) -> Contribution:
+        """Rows of columns (N, k) that act at one joint, at its motor, its link or in its spring."""
+        n, index = self.robot.n, self.robot.index(joint)
+        link, motor = (np.zeros((len(self.motion), n, columns.shape[1])) for _ in range(2))
+        if side in (Side.MOTOR, Side.SPRING):
+            motor[:, index] = columns
+        if side is Side.LINK:
+            link[:, index] = columns
+        elif side is Side.SPRING:
+            link[:, index] = -columns
+        return Contribution(link, motor)
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationState:
+    """State of the robot at one instant of a simulation.
+
+    Attributes:
+        time: [s].
+        q: (n,) link positions.
+        dq: (n,) link velocities.
+        theta: (n,) motor positions after the gear.
+        dtheta: (n,) motor velocities after the gear.
+        tau_spring: (n,) spring torques [N m].
+        tau_motor: (n,) commanded motor torques at the joint side [N m].
+    """
+
+    time: float
+    q: FloatArray
+    dq: FloatArray
+    theta: FloatArray
+    dtheta: FloatArray
+    tau_spring: FloatArray
+    tau_motor: FloatArray
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """One physical cause; subclasses live in one file each.
+
+    Attributes:
+        joint: joint at which it acts, None where it acts on the whole robot.
+    """
+
+    joint: str | None = None
+
+    name: ClassVar[str]
+    side: ClassVar[Side]
+    source: ClassVar[str]
+    shapes: ClassVar[tuple[Shape, ...]] = ()
+
+    @abstractmethod
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """The columns that it adds to the regressor of this robot."""
+
+    @abstractmethod
+    def evaluate(self, state: State) -> Contribution:
+        """Link and motor rows (N, n, k) of its columns, in the order of `columns`."""
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple["Effect", ...]:
+        """All the places at which it can act on this robot; by default once at every joint."""
+        return tuple(cls(joint=name) for name in robot.joint_names)
+
+    def prior(self, robot: Robot) -> FloatArray:
+        """(k,) values that the robot's description gives to its parameters, NaN where it gives none."""
+        return np.full(len(self.columns(robot)), np.nan)
+
+    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+        """How it acts in a simulation.
+
+        Args:
+            robot: the robot.
+            values: (k,) values of its parameters.
+
+        Returns:
+            A function that adds its torque to the link rows (n,) and the motor rows (n,), with the sign of
+            `evaluate`: a friction adds a positive number at positive speed.
+
+        Raises:
+            EffectError: if it cannot act in a simulation as a torque of the present state.
+        """
+        raise EffectError(f"the effect {self.name!r} cannot be simulated as a torque of the present state")
+
+    def parameter_name(self, label: str | None = None) -> str:
+        """`<joint>.<effect>` or `<joint>.<effect>_<label>`."""
+        stem = f"{self.joint}.{self.name}" if self.joint is not None else f"robot.{self.name}"
+        return stem if label is None else f"{stem}_{label}"
+
+    @property
+    def shape_values(self) -> dict[str, float]:
+        """Values of its nonlinear parameters."""
+        return {shape.name: float(getattr(self, shape.name)) for shape in self.shapes}
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can hold; `effect_from_dict` reads it."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "joint"}
+        return {"effect": self.name, "joint": self.joint, "shape": values}
+
+
+class JointEffect(Effect):
+    """An effect at a single joint, whose columns depend on the state of that joint and on nothing else."""
+
+    @abstractmethod
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N, k) columns from the state (N,) of the joint."""
+
+    def evaluate(self, state: State) -> Contribution:
+        """Link and motor rows (N, n, k)."""
+        motion, joint = state.motion, self.required_joint
+        i = state.robot.index(joint)
+        columns = self.local_columns(motion.q[:, i], motion.dq[:, i], motion.theta[:, i], motion.dtheta[:, i])
+        return state.at(self.side, joint, columns)
+
+    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+        """The columns at the present state, times the values."""
+        i = robot.index(self.required_joint)
+        on_link = {Side.LINK: 1.0, Side.SPRING: -1.0}.get(self.side, 0.0)
+        on_motor = {Side.MOTOR: 1.0, Side.SPRING: 1.0}.get(self.side, 0.0)
+
+        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+            row = self.local_columns(
+                state.q[i : i + 1], state.dq[i : i + 1], state.theta[i : i + 1], state.dtheta[i : i + 1]
+            )[0]
+            amount = float(row @ values)
+            link[i] += on_link * amount
+            motor[i] += on_motor * amount
+
+        return act
+
+    @property
+    def required_joint(self) -> str:
+        """The joint.
+
+        Raises:
+            EffectError: if none was given.
+        """
+        if self.joint is None:
+            raise EffectError(f"the effect {self.name!r} acts at a joint; give joint=...")
+        return self.joint
+
+    def units_of(self, robot: Robot) -> tuple[str, str]:
+        """Units of torque and of position of its joint: (N m, rad) or (N, m)."""
+        joint = robot.joints[robot.index(self.required_joint)]
+        return joint.torque_unit, joint.position_unit
+
+
+def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:
+    """tanh(v / v_off): within 4 % of the sign above 2 v_off (paper, eq. 3)."""
+    return np.tanh(velocity / smoothing)

@@ -1,0 +1,52 @@
+"""Inertia and gravity of the links."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Column, Contribution, Effect, Side, SimulationState, State
+from sea_ident.robot import INERTIAL_UNITS, Robot
+
+
+@dataclass(frozen=True)
+class RigidBodies(Effect):
+    """Ten standard inertial parameters for every moving link, about its joint frame."""
+
+    name: ClassVar[str] = "rigid_bodies"
+    side: ClassVar[Side] = Side.BOTH
+    source: ClassVar[str] = "Hollerbach, Khalil, Gautier, Model identification, Springer Handbook of Robotics, 2008"
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
+        """Once for the whole robot."""
+        return (cls(),)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """`<link>.m`, `<link>.mx`, ..., `<link>.Izz`, body by body."""
+        units = INERTIAL_UNITS * len(robot.bodies)
+        return tuple(
+            Column(
+                name,
+                unit,
+                self.name,
+                None,
+                self.side,
+                nonnegative=name.endswith((".m", ".Ixx", ".Iyy", ".Izz")),
+            )
+            for name, unit in zip(robot.inertial_names, units, strict=True)
+        )
+
+    def evaluate(self, state: State) -> Contribution:
+        """Rows of the links as bodies of the extended model."""
+        bodies = state.robot.body_indices
+        take = (10 * (bodies - 1)[:, None] + range(10)).ravel()
+        return state.rows(state.extended_regressor[:, :, take])
+
+    def prior(self, robot: Robot) -> FloatArray:
+        """The URDF's own inertials."""
+        return robot.inertial_parameters
+
+    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+        """Nothing to add: the simulator integrates the bodies themselves."""
+        return lambda state, link, motor: None

@@ -1,0 +1,48 @@
+"""Stiffness that grows with the deflection."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Column, Effect, JointEffect, Shape, Side
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class SpringStiffening(JointEffect):
+    """K (theta - q) |theta - q|^(p-1); p = 3 is the paper's cubic stiffness.
+
+    Attributes:
+        joint: joint at which it acts.
+        exponent: p [-].
+    """
+
+    exponent: float = 3.0
+
+    name: ClassVar[str] = "spring_stiffening"
+    side: ClassVar[Side] = Side.SPRING
+    source: ClassVar[str] = "Vantilt et al., ICRA 2015, eq. 21"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "-", 2.0, 3.0, logarithmic=False),)
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
+        """At every elastic joint."""
+        return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """One column."""
+        torque, position = self.units_of(robot)
+        unit = f"{torque}/{position}{self.exponent:g}"
+        return (Column(self.parameter_name(), unit, self.name, self.joint, self.side),)
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """D |d|^(p-1)."""
+        deflection = theta - q
+        return (deflection * np.abs(deflection) ** (self.exponent - 1.0))[:, None]
+
+    def prior(self, robot: Robot) -> FloatArray:
+        """The annotation's cubic stiffness."""
+        value = robot.spring(self.required_joint).cubic_stiffness if self.exponent == 3.0 else None
+        return np.array([np.nan if value is None else value])

@@ -1,0 +1,124 @@
+"""The regressor: effects in, labelled columns out."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects import Column, Effect, State
+from sea_ident.exceptions import SeaIdentError
+from sea_ident.motion import Motion
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Regressor:
+    """Link and motor rows of the regressor Phi (paper, eq. 8).
+
+    Attributes:
+        columns: (p,) labels.
+        link: (N, n, p) link rows: ``link @ psi = 0``, with the springs among the columns.
+        motor: (N, n, p) motor rows: ``motor @ psi = tau_motor``.
+    """
+
+    columns: tuple[Column, ...]
+    link: FloatArray
+    motor: FloatArray
+
+    @property
+    def sum(self) -> FloatArray:
+        """(N, n, p) sum of both: ``sum @ psi = tau_motor`` without a spring model (paper, eq. 4)."""
+        return self.link + self.motor
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(p,) names of the parameters."""
+        return tuple(column.name for column in self.columns)
+
+    def summary(self) -> str:
+        """Size and columns."""
+        samples, n, _ = self.link.shape
+        lines = [f"regressor: {samples} samples, {n} joints, {len(self.columns)} columns"]
+        lines.extend(f"  {c.name} [{c.unit}] {c.effect}, {c.side}" for c in self.columns)
+        return "\n".join(lines)
+
+
+def model_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, ...]:
+    """Labels of all columns of a model, in order.
+
+    Raises:
+        SeaIdentError: if two columns share a name.
+    """
+    columns = tuple(column for effect in effects for column in effect.columns(robot))
+    names = [column.name for column in columns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise SeaIdentError(f"the effects give two columns the same name: {', '.join(twice)}; leave one out")
+    return columns
+
+
+def prior_parameters(robot: Robot, effects: Sequence[Effect]) -> FloatArray:
+    """(p,) values that the robot's description gives to all parameters, NaN where it gives none."""
+    return np.concatenate([effect.prior(robot) for effect in effects]) if effects else np.zeros(0)
+
+
+def build_regressor(
+    robot: Robot,
+    effects: Sequence[Effect],
+    motion: Motion,
+    channels: Mapping[str, FloatArray] | None = None,
+) -> Regressor:
+    """Build the regressor of a motion.
+
+    Args:
+        robot: the robot.
+        effects: the model.
+        motion: (N, n) motion.
+        channels: further measured signals (N, n) by kind, for effects that need them.
+
+    Returns:
+        Labelled link and motor rows.
+
+    Raises:
+        SeaIdentError: if the motion does not fit the robot.
+    """
+    if motion.n != robot.n:
+        raise SeaIdentError(f"the motion has {motion.n} joints, {robot.name} has {robot.n}")
+    state = State(robot, motion, channels)
+    columns = model_columns(robot, effects)
+    parts = [effect.evaluate(state) for effect in effects]
+    empty = np.zeros((len(motion), robot.n, 0))
+    return Regressor(
+        columns,
+        np.concatenate([empty, *(part.link for part in parts)], axis=2),
+        np.concatenate([empty, *(part.motor for part in parts)], axis=2),
+    )
+
+
+def regressor_chunks(robot: Robot, effects: Sequence[Effect], motion: Motion, size: int = 1000) -> Iterator[Regressor]:
+    """The regressor in parts of at most `size` samples, so that memory does not grow with the recording."""
+    for part in motion.chunks(size):
+        yield build_regressor(robot, effects, part)
+
+
+def inverse_dynamics(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Torque of bodies and rotors with the inertial parameters of the robot, by Pinocchio's RNEA.
+
+    Args:
+        robot: the robot.
+        motion: (N, n) motion.
+
+    Returns:
+        Link rows (N, n) and motor rows (N, n) [N m]; their sum is the motor torque of the frictionless robot.
+    """
+    model = robot.extended_model
+    data = model.createData()
+    x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
+    v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
+    a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))
+    torque = np.empty_like(x)
+    for k in range(len(motion)):
+        torque[k] = pin.rnea(model, data, x[k], v[k], a[k])
+    return torque @ robot.link_map, torque @ robot.motor_map

@@ -1,0 +1,328 @@
+"""Reading of URDF text: safe XML, the kinematic tree, and the checks that Pinocchio does not make.
+
+Only what rigid-body dynamics needs is looked at; geometry is left alone, so missing meshes do not matter.
+"""
+
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import RobotError
+
+MOVING_TYPES = ("revolute", "continuous", "prismatic")
+REFUSED_TYPES = ("floating", "planar", "spherical", "ball")
+LARGEST_FILE = 64 * 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Mimic:
+    """Position = multiplier x position of another joint + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class JointElement:
+    """A joint as its URDF states it.
+
+    Attributes:
+        name: name of the joint.
+        type: URDF type: revolute, continuous, prismatic, fixed, floating, planar.
+        parent: name of the parent link.
+        child: name of the child link.
+        axis: (3,) unit axis in the joint frame [-].
+        rotation: (3, 3) orientation of the joint frame in the parent link [-].
+        lower: lowest position [rad] or [m].
+        upper: highest position [rad] or [m].
+        velocity: largest speed [rad/s] or [m/s].
+        effort: largest torque [N m] or force [N].
+        damping: viscous friction of the link side [N m s/rad] or [N s/m]; None where not stated.
+        friction: Coulomb friction of the link side [N m] or [N]; None where not stated.
+        mimic: the joint that this one follows.
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    axis: FloatArray
+    rotation: FloatArray
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+    damping: float | None
+    friction: float | None
+    mimic: Mimic | None
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfTree:
+    """The kinematic tree of a URDF.
+
+    Attributes:
+        name: name of the robot.
+        text: the XML it was read from.
+        file: where it came from, for messages.
+        root: the parsed XML.
+        base: name of the root link.
+        links: link names to mass [kg] (0 where there is no inertial).
+        joints: joints by name, in file order.
+    """
+
+    name: str
+    text: str
+    file: str
+    root: etree._Element
+    base: str
+    links: dict[str, float]
+    joints: dict[str, JointElement]
+
+    def path_to_root(self, link: str) -> tuple[str, ...]:
+        """Names of the links from `link` (included) up to the root link."""
+        parent_of = {j.child: j.parent for j in self.joints.values()}
+        path = [link]
+        while path[-1] in parent_of:
+            path.append(parent_of[path[-1]])
+        return tuple(path)
+
+
+def parse_xml(text: str | bytes, file: str) -> etree._Element:
+    """Parse XML without entities, DTDs or network.
+
+    Args:
+        text: the XML.
+        file: where it came from, for messages.
+
+    Returns:
+        The root element.
+
+    Raises:
+        RobotError: if it is not well-formed, or carries a document type.
+    """
+    data = text.encode() if isinstance(text, str) else text
+    if len(data) > LARGEST_FILE:
+        raise RobotError(f"{file}: {len(data)} bytes is too large for a URDF (at most {LARGEST_FILE})")
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        root = etree.fromstring(data, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise RobotError(f"{file}: malformed XML: {error}; correct the file") from None
+    if root.getroottree().docinfo.doctype:
+        raise RobotError(f"{file}: carries a DOCTYPE, which is not read for safety; remove it")
+    return root
+
+
+def number(element: etree._Element, attribute: str, default: float | None, where: str) -> float:
+    """A finite number from an attribute.
+
+    Raises:
+        RobotError: if the attribute is missing without a default, not a number, or not finite.
+    """
+    text = element.get(attribute)
+    if text is None:
+        if default is None:
+            raise RobotError(f"{where}: <{element.tag}> has no attribute {attribute!r}; add it")
+        return default
+    try:
+        value = float(text)
+    except ValueError:
+        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not a number") from None
+    if not isfinite(value):
+        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not finite")
+    return value
+
+
+def vector(element: etree._Element | None, attribute: str, default: str, where: str) -> FloatArray:
+    """Three finite numbers from an attribute.
+
+    Raises:
+        RobotError: if there are not three finite numbers.
+    """
+    text = default if element is None else element.get(attribute, default)
+    try:
+        value = np.array([float(part) for part in text.split()])
+    except ValueError:
+        raise RobotError(f"{where}: {attribute}={text!r} is not three numbers") from None
+    if value.shape != (3,) or not np.all(np.isfinite(value)):
+        raise RobotError(f"{where}: {attribute}={text!r} is not three finite numbers")
+    return value
+
+
+def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
+    """Rotation matrix (3, 3) of URDF roll, pitch, yaw [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _link_mass(link: etree._Element, where: str) -> float:
+    inertial = link.find("inertial")
+    if inertial is None:
+        return 0.0
+    mass_element = inertial.find("mass")
+    if mass_element is None:
+        raise RobotError(f"{where}: <inertial> has no <mass>; add it or remove the <inertial>")
+    mass = number(mass_element, "value", None, where)
+    if mass < 0.0:
+        raise RobotError(f"{where}: mass is {mass} kg; a mass cannot be negative")
+    vector(inertial.find("origin"), "xyz", "0 0 0", where)
+    vector(inertial.find("origin"), "rpy", "0 0 0", where)
+    tensor = inertial.find("inertia")
+    if tensor is not None:
+        for name in ("ixx", "iyy", "izz"):
+            value = number(tensor, name, 0.0, where)
+            if value < 0.0:
+                raise RobotError(f"{where}: {name} is {value} kg m2; a moment of inertia cannot be negative")
+        for name in ("ixy", "ixz", "iyz"):
+            number(tensor, name, 0.0, where)
+    return mass
+
+
+def _joint(element: etree._Element, file: str) -> JointElement:
+    name = element.get("name", "")
+    if not name:
+        raise RobotError(f"{file}: a <joint> (line {element.sourceline}) has no name")
+    where = f"{file}: joint {name!r}"
+    kind = element.get("type", "")
+    if kind not in (*MOVING_TYPES, *REFUSED_TYPES, "fixed"):
+        raise RobotError(f"{where}: unknown type {kind!r}; use revolute, continuous, prismatic or fixed")
+    ends = {}
+    for end in ("parent", "child"):
+        end_element = element.find(end)
+        if end_element is None or not end_element.get("link"):
+            raise RobotError(f"{where}: has no <{end} link=...>")
+        ends[end] = end_element.get("link", "")
+    axis = vector(element.find("axis"), "xyz", "1 0 0", where)
+    if kind in MOVING_TYPES:
+        length = float(np.linalg.norm(axis))
+        if length < 1e-3 or abs(length - 1.0) > 1e-2:
+            raise RobotError(f"{where}: axis {axis.tolist()} has length {length:.6g}, not 1; give a unit axis")
+        axis = axis / length
+    limit, dynamics, mimic_element = element.find("limit"), element.find("dynamics"), element.find("mimic")
+    inf = float("inf")
+    lower, upper, velocity, effort = -inf, inf, inf, inf
+    if limit is not None:
+        velocity = abs(number(limit, "velocity", inf, where)) or inf
+        effort = abs(number(limit, "effort", inf, where)) or inf
+        if kind in ("revolute", "prismatic"):
+            # URDF: an omitted bound of a limited joint is zero; both zero means that none was stated.
+            lower, upper = number(limit, "lower", 0.0, where), number(limit, "upper", 0.0, where)
+            if lower > upper:
+                raise RobotError(f"{where}: lower limit {lower} is above upper limit {upper}; exchange them")
+            if lower == upper:
+                lower, upper = -inf, inf
+    mimic = None
+    if mimic_element is not None:
+        mimic = Mimic(
+            joint=mimic_element.get("joint", ""),
+            multiplier=number(mimic_element, "multiplier", 1.0, where),
+            offset=number(mimic_element, "offset", 0.0, where),
+        )
+    damping = friction = None
+    if dynamics is not None:
+        damping = number(dynamics, "damping", 0.0, where) if "damping" in dynamics.attrib else None
+        friction = number(dynamics, "friction", 0.0, where) if "friction" in dynamics.attrib else None
+        for label, value in (("damping", damping), ("friction", friction)):
+            if value is not None and value < 0.0:
+                raise RobotError(f"{where}: {label} is {value}; it cannot be negative")
+    origin = element.find("origin")
+    vector(origin, "xyz", "0 0 0", where)
+    return JointElement(
+        name=name,
+        type=kind,
+        parent=ends["parent"],
+        child=ends["child"],
+        axis=axis,
+        rotation=rotation_from_rpy(vector(origin, "rpy", "0 0 0", where)),
+        lower=lower,
+        upper=upper,
+        velocity=velocity,
+        effort=effort,
+        damping=damping,
+        friction=friction,
+        mimic=mimic,
+    )
+
+
+def parse_urdf(text: str | bytes, file: str) -> UrdfTree:
+    """Read the kinematic tree of a URDF and check that it is one.
+
+    Args:
+        text: the XML.
+        file: where it came from, for messages.
+
+    Returns:
+        The tree.
+
+    Raises:
+        RobotError: malformed XML, duplicate names, unknown links, closed loops, several roots, negative masses.
+    """
+    root = parse_xml(text, file)
+    if root.tag != "robot":
+        hint = "; expand it with xacro first" if "xacro" in str(root.tag) else ""
+        raise RobotError(f"{file}: the root element is <{root.tag}>, not <robot>{hint}")
+    links: dict[str, float] = {}
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        if not name:
+            raise RobotError(f"{file}: a <link> (line {link.sourceline}) has no name")
+        if name in links:
+            raise RobotError(f"{file}: two links are named {name!r}; rename one")
+        links[name] = _link_mass(link, f"{file}: link {name!r}")
+    joints: dict[str, JointElement] = {}
+    for element in root.findall("joint"):
+        joint = _joint(element, file)
+        if joint.name in joints:
+            raise RobotError(f"{file}: two joints are named {joint.name!r}; rename one")
+        joints[joint.name] = joint
+    if not links:
+        raise RobotError(f"{file}: has no <link>; is it a URDF?")
+    base = _check_tree(links, joints, file)
+    decoded = text if isinstance(text, str) else text.decode("utf-8", errors="replace")
+    return UrdfTree(root.get("name") or Path(file).stem, decoded, file, root, base, links, joints)
+
+
+def _check_tree(links: dict[str, float], joints: dict[str, JointElement], file: str) -> str:
+    """The name of the single root link, or an error that says why this is not a tree."""
+    parent_joint: dict[str, str] = {}
+    for joint in joints.values():
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise RobotError(f"{file}: joint {joint.name!r} names the link {link!r}, which does not exist")
+        if joint.child in parent_joint:
+            raise RobotError(
+                f"{file}: link {joint.child!r} is the child of two joints, {parent_joint[joint.child]!r} and "
+                f"{joint.name!r}: a closed loop. Cut the loop: remove one of the two joints"
+            )
+        parent_joint[joint.child] = joint.name
+        if joint.mimic is not None and (joint.mimic.joint not in joints or joint.mimic.joint == joint.name):
+            raise RobotError(f"{file}: joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist")
+    roots = [link for link in links if link not in parent_joint]
+    if not roots:
+        raise RobotError(f"{file}: no link is a root: the joints form a closed loop. Remove one joint of it")
+    if len(roots) > 1:
+        raise RobotError(f"{file}: several root links: {', '.join(roots)}; connect them by fixed joints")
+    reached, children = {roots[0]}, [roots[0]]
+    by_parent: dict[str, list[str]] = {}
+    for joint in joints.values():
+        by_parent.setdefault(joint.parent, []).append(joint.child)
+    while children:
+        for child in by_parent.get(children.pop(), []):
+            reached.add(child)
+            children.append(child)
+    if len(reached) < len(links):
+        lost = ", ".join(sorted(set(links) - reached))
+        raise RobotError(f"{file}: the links {lost} form a closed loop. Remove one of its joints")
+    return roots[0]
