@@ -183,7 +183,7 @@ def _link_mass(link: etree._Element, where: str) -> float:
     if tensor is not None:
         for name in ("ixx", "iyy", "izz"):
             value = number(tensor, name, 0.0, where)
-            if value < 0.0:
+            if value < -1e-12:  # CAD exports write a zero as -5e-20
                 raise RobotError(f"{where}: {name} is {value} kg m2; a moment of inertia cannot be negative")
         for name in ("ixy", "ixz", "iyz"):
             number(tensor, name, 0.0, where)
