@@ -278,12 +278,12 @@ def _warnings(tree: UrdfTree, parsed: Annotation, joints: tuple[Joint, ...], mod
     for k in range(1, model.njoints):
         name, inertia = tree.joints[model.names[k]].child, model.inertias[k]
         moments = np.linalg.eigvalsh(inertia.inertia)
-        if moments[0] < -1e-9 * max(moments[2], 1e-12):
+        if moments[0] < -1e-9 * max(moments[2], 1e-3):
             raise RobotError(
                 f"{tree.file}: link {name!r}: its inertia tensor has the negative principal moment {moments[0]:.4g} "
                 f"kg m2; correct <inertia>"
             )
-        if moments[0] + moments[1] < moments[2] * (1.0 - 1e-6):
+        if moments[0] + moments[1] < moments[2] * (1.0 - 1e-6) - 1e-12:
             notes.append(
                 f"link {name!r}: no body has the principal moments {moments[0]:.4g}, {moments[1]:.4g}, "
                 f"{moments[2]:.4g} kg m2 (the largest exceeds the sum of the others)"
