@@ -1,0 +1,84 @@
+"""The application: verbs, exit codes, and what happens on errors and Ctrl-C."""
+
+import os
+import signal
+import sys
+import traceback
+import warnings
+from typing import Annotated, NoReturn
+
+import typer
+
+from sea_ident import __version__
+from sea_ident.cli.inspect_robot import inspect_robot
+from sea_ident.cli.output import note
+from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+
+BAD_INPUT = 2
+DEFECT = 1
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="sea-ident",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("inspect")(inspect_robot)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"sea-ident {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _describe(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Dynamic-model identification for robots with series-elastic joints.
+
+    Exit codes: 0 done, 2 bad input (message on standard error), 1 defect.
+    """
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
+    if issubclass(category, SeaIdentWarning):
+        note(f"warning: {message}")
+
+
+class _Interrupted(BaseException):
+    """Ctrl-C or a polite kill; unlike KeyboardInterrupt it passes through the parser untouched."""
+
+
+def _interrupt(*_: object) -> NoReturn:
+    raise _Interrupted
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    warnings.simplefilter("once", SeaIdentWarning)
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
+    # A polite kill unwinds like Ctrl-C, so that temporary files are removed.
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, _interrupt)
+    try:
+        app(prog_name="sea-ident")
+    except SeaIdentError as error:
+        note(f"error: {error}")
+        sys.exit(BAD_INPUT)
+    except _Interrupted:
+        note("interrupted; nothing half-written is left")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has gone (`| head`); keep the interpreter from complaining at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except Exception:
+        traceback.print_exc()
+        note("error: this is a defect of sea-ident, not of your input; please report it with the lines above")
+        sys.exit(DEFECT)

@@ -1,0 +1,39 @@
+"""Arguments and options that several verbs share."""
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+RobotSource: TypeAlias = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="URDF file, name of a shipped robot (exo_leg), or example:<path inside example-robot-data>.",
+        show_default=False,
+    ),
+]
+AnnotationFile: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--annotation", metavar="FRAGMENT.urdf", help="URDF fragment with nothing but transmissions."),
+]
+JointNames: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--joints", metavar="a,b,c", help="Joints that move; all others are locked. Default: all."),
+]
+AsJson: TypeAlias = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")
+]
+Seed: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+Period: TypeAlias = Annotated[
+    float | None, typer.Option("--period", metavar="S", help="Period of the motion [s]; not periodic without it.")
+]
+ReportFile: TypeAlias = Annotated[
+    Path | None, typer.Option("--report", metavar="R.html", help="Also write a report, one HTML file.")
+]
+ModelFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="MODEL.json", help="A model that `identify` wrote.", show_default=False)
+]
+RecordingFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="REC", help="A recording (.csv, .npz, ...).", show_default=False)
+]

@@ -1,0 +1,98 @@
+"""What verbs share when they speak: JSON on standard output, everything else on standard error."""
+
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sea_ident.exceptions import SeaIdentError
+
+
+def plain(value: Any) -> Any:
+    """The same in types that JSON holds; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value
+
+
+def emit(record: Mapping[str, Any], text: str, *, as_json: bool) -> None:
+    """Print the result of a verb: as one JSON object, or as text for people."""
+    if as_json:
+        print(json.dumps(plain(record), indent=1, allow_nan=False))
+    else:
+        print(text)
+
+
+def note(text: str) -> None:
+    """A line for people, on standard error."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def check_targets(*targets: Path | None) -> None:
+    """Refuse before the work starts what could not be written after it.
+
+    Raises:
+        SeaIdentError: a folder does not exist or cannot be written to, or two outputs are one file.
+    """
+    seen: set[Path] = set()
+    for target in targets:
+        if target is None:
+            continue
+        folder = target.parent
+        if target.is_dir():
+            raise SeaIdentError(f"{target}: is a folder; give the name of a file")
+        if not folder.is_dir():
+            raise SeaIdentError(f"{target}: the folder {folder} does not exist; make it first")
+        if not os.access(folder, os.W_OK):
+            raise SeaIdentError(f"{target}: the folder {folder} cannot be written to")
+        if target.resolve() in seen:
+            raise SeaIdentError(f"{target}: is named for two outputs; give each a file of its own")
+        seen.add(target.resolve())
+
+
+def _silent(done: int, what: str | None = None) -> None:
+    """Progress where nobody watches."""
+
+
+@contextmanager
+def progress(description: str, total: int | None = None) -> Iterator[Callable[[int, str | None], None]]:
+    """A progress bar with the time left, on standard error where that is a terminal.
+
+    Args:
+        description: what is being done.
+        total: number of steps; None where it is not known, which shows the time passed only.
+
+    Yields:
+        Function to call with the number of steps done so far, and what is being done now or None.
+    """
+    if not sys.stderr.isatty():
+        yield _silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        *(() if total is None else (BarColumn(), TimeRemainingColumn())),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(description, total=total)
+
+        def update(done: int, what: str | None = None) -> None:
+            bar.update(task, completed=done, description=what or description)
+
+        yield update
