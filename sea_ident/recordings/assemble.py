@@ -1,19 +1,27 @@
 """From the raw columns of a file to a Recording, by the user's translation."""
 
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
-from sea_ident.recordings.arrays import RawTable
-from sea_ident.recordings.columns import ColumnSource, convert, describe
+from sea_ident.recordings.alignment import ClockAlignment, Stream, align_streams
+from sea_ident.recordings.columns import ColumnSource, as_source, convert, describe
 from sea_ident.recordings.naming import TIME, dimension_of
 from sea_ident.recordings.recording import Recording
+from sea_ident.recordings.table import RawTable
 
 _TIME_ELSEWHERE = ("t", "time", "time_s", "timestamp", "stamp", "secs", "seconds")
 
 
-def assemble(table: RawTable, columns: Mapping[str, ColumnSource] | None, source: str) -> Recording:
+def assemble(
+    table: RawTable,
+    columns: Mapping[str, ColumnSource] | None,
+    clocks: ClockAlignment | None,
+    source: str,
+) -> Recording:
     """Build a recording from the columns of a file.
 
     Without a translation every column is taken as it is. With one, the translated columns come first, then
@@ -22,57 +30,123 @@ def assemble(table: RawTable, columns: Mapping[str, ColumnSource] | None, source
 
     Args:
         table: Columns of the file.
-        columns: Column of the recording -> where it comes from.
+        columns: Column of the recording -> where it comes from; one `*` on both sides stands for the same text.
+        clocks: How columns of different clocks are brought together.
         source: File name for messages.
 
     Returns:
         The recording.
 
     Raises:
-        RecordingError: a column is absent or malformed.
+        RecordingError: a column is absent or malformed, or the clocks cannot be aligned.
     """
     raw = table.columns
+    notes = list(table.notes)
     left_out = list(table.left_out)
+    sources: dict[str, ColumnSource] = {}
     if columns is None:
-        if TIME not in raw:
-            raise RecordingError(_no_time(raw, source))
-        rest = {name: values for name, values in raw.items() if name != TIME}
-        return Recording(raw[TIME], rest, source, notes=_left_out(left_out))
-    converted: dict[str, FloatArray] = {}
-    notes = []
+        sources = {name: ColumnSource(name) for name in raw if name not in set(table.clocks.values())}
+    else:
+        sources = _expand(columns, table, source)
+        notes += [describe(target, how) for target, how in sources.items()]
+        used = {how.name for how in sources.values()} | _time_names(sources, table)
+        for name in raw:
+            if name not in used and name not in sources:
+                if dimension_of(name) is None:
+                    left_out.append(name)
+                else:
+                    sources[name] = ColumnSource(name)
+    if left_out:
+        notes.append(f"left out of the file: {', '.join(left_out)}")
+    streams = _streams(sources, table, source, translated=columns is not None)
+    if len(streams) == 1 and (clocks is None or clocks == ClockAlignment()):
+        only = streams[0]
+        return Recording(only.time, only.columns, source, notes=tuple(notes))
+    aligned = align_streams(streams, clocks, source=source).recording
+    return replace(aligned, notes=(*notes, *aligned.notes))
+
+
+def _expand(columns: Mapping[str, ColumnSource], table: RawTable, source: str) -> dict[str, ColumnSource]:
+    """Replace entries with `*` by one entry per column that fits."""
+    raw = table.columns
+    found: dict[str, ColumnSource] = {}
     for target, how in columns.items():
-        if how.name not in raw:
-            raise RecordingError(absent(how.name, target, raw, source))
-        converted[target] = convert(raw[how.name], target, how)
-        notes.append(describe(target, how))
-    used = {how.name for how in columns.values()}
-    for name, values in raw.items():
-        if name in used or name in converted:
+        if "*" not in target:
+            if how.name not in raw:
+                raise RecordingError(_absent(how.name, target, table, source))
+            found[target] = how
             continue
-        if dimension_of(name) is None:
-            left_out.append(name)
+        if target.count("*") != 1 or how.name.count("*") != 1:
+            raise RecordingError(f"columns: {target!r} from {how.name!r}: one * is needed on both sides")
+        before, after = map(re.escape, how.name.split("*"))
+        matches = [(name, re.fullmatch(f"{before}(.+){after}", name)) for name in raw]
+        names = {target.replace("*", match[1]): name for name, match in matches if match is not None}
+        known = {to: name for to, name in names.items() if dimension_of(to) is not None}
+        if not known:
+            raise RecordingError(_absent(how.name, target, table, source))
+        for to, name in known.items():
+            found.setdefault(to, replace(how, name=name))
+    return found
+
+
+def _time_names(sources: Mapping[str, ColumnSource], table: RawTable) -> set[str]:
+    own = {as_source(how.time).name for how in sources.values() if how.time is not None}
+    return own | set(table.clocks.values())
+
+
+def _streams(sources: Mapping[str, ColumnSource], table: RawTable, source: str, *, translated: bool) -> list[Stream]:
+    """Columns grouped by clock, converted."""
+    raw = table.columns
+    time = sources.get(TIME)
+    if time is not None and table.clocks:
+        raise RecordingError(
+            f"{source}: the messages of a bag have stamps of their own: leave 'time' out of columns, and choose the "
+            "clock that counts by clocks=ClockAlignment(reference=...)"
+        )
+    groups: dict[ColumnSource, dict[str, FloatArray]] = {}
+    if time is not None:
+        groups[time] = {}
+    for target, how in sources.items():
+        if target == TIME:
+            continue
+        if how.time is not None:
+            clock = as_source(how.time)
+        elif how.name in table.clocks:
+            clock = ColumnSource(table.clocks[how.name])
+        elif time is not None:
+            clock = time
         else:
-            converted[name] = values
-    if TIME not in converted:
-        raise RecordingError(_no_time(raw, source))
-    return Recording(converted.pop(TIME), converted, source, notes=(*notes, *_left_out(left_out)))
+            raise RecordingError(_no_time(table, source))
+        if clock.name not in raw:
+            raise RecordingError(_absent(clock.name, f"the time of {target}", table, source))
+        values = convert(raw[how.name], target, how) if translated else raw[how.name]
+        groups.setdefault(clock, {})[target] = values
+    if not groups:
+        raise RecordingError(_no_time(table, source))
+    return [
+        Stream(clock.name.removesuffix(":time"), convert(raw[clock.name], TIME, clock), values)
+        for clock, values in groups.items()
+        if values or len(groups) == 1
+    ]
 
 
-def absent(name: str, target: str, raw: Mapping[str, FloatArray], source: str) -> str:
-    """Message for a column of the translation that the file does not have."""
-    near = get_close_matches(name, raw, n=1, cutoff=0.6)
+def _absent(name: str, target: str, table: RawTable, source: str) -> str:
+    near = get_close_matches(name, table.columns, n=1, cutoff=0.6)
     hint = f" Did you mean {near[0]!r}?" if near else ""
-    return f"{source}: no column {name!r} (wanted for {target}).{hint} There are: {', '.join(raw) or 'none'}"
-
-
-def _no_time(raw: Mapping[str, FloatArray], source: str) -> str:
-    near = [name for name in raw if name.strip().lower() in _TIME_ELSEWHERE]
-    example = near[0] if near else "<name in the file>"
     return (
-        f"{source}: no column 'time'; there are: {', '.join(raw) or 'none'}. If it has another name, say "
-        f"columns={{'time': {example!r}}}"
+        f"{source}: no column {name!r} (wanted for {target}).{hint} "
+        f"There are: {', '.join(table.columns) or 'none'}{_and_others(table)}"
     )
 
 
-def _left_out(names: list[str]) -> tuple[str, ...]:
-    return (f"left out of the file: {', '.join(names)}",) if names else ()
+def _no_time(table: RawTable, source: str) -> str:
+    near = [name for name in table.columns if name.strip().lower() in _TIME_ELSEWHERE]
+    example = near[0] if near else "<name in the file>"
+    return (
+        f"{source}: no column 'time'; there are: {', '.join(table.columns) or 'none'}{_and_others(table)}. "
+        f"If it has another name, say columns={{'time': {example!r}}}"
+    )
+
+
+def _and_others(table: RawTable) -> str:
+    return f". Left out: {', '.join(table.left_out)}" if table.left_out else ""

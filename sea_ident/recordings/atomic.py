@@ -48,7 +48,7 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
         path: Folder to be written; its parent must exist.
 
     Yields:
-        Path of the temporary folder, which does not exist yet.
+        Path of the temporary folder, which does not exist yet and has the name of `path`.
 
     Raises:
         RecordingError: something stands at `path`, or it cannot be written.
@@ -58,8 +58,9 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
         raise RecordingError(f"{target}: exists already; remove it or choose another name")
     temporary = _sibling(target)
     try:
-        yield temporary
-        os.rename(temporary, target)
+        temporary.mkdir()
+        yield temporary / target.name
+        os.rename(temporary / target.name, target)
     except OSError as error:
         raise RecordingError(f"{target}: cannot be written: {error.strerror or error}") from error
     finally:

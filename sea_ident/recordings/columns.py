@@ -51,7 +51,8 @@ class ColumnSource:
         counts_per_rev: Encoder counts per turn, with the unit `counts` or `counts/s`.
         wraps_at: Span [file unit] after which the reading starts again (360 for degrees, 65536 for a 16-bit
             counter); steps of more than half of it are then taken as a wrap and undone.
-        time: Name of the time column of this signal, where it has another clock than the rest.
+        time: Time column of this signal, where it has another clock than the rest; with its unit as a
+            `ColumnSource`.
 
     Raises:
         RecordingError: a number is not finite, or zero where it cannot be; `counts` without `counts_per_rev`.
@@ -65,7 +66,7 @@ class ColumnSource:
     gear_ratio: float = 1.0
     counts_per_rev: float | None = None
     wraps_at: float | None = None
-    time: str | None = None
+    time: "str | ColumnSource | None" = None
 
     def __post_init__(self) -> None:
         for field in ("zero", "scale", "gear_ratio"):

@@ -10,20 +10,17 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
-from sea_ident.recordings.arrays import RawTable
-from sea_ident.recordings.naming import TIME, dimension_of
+from sea_ident.recordings.naming import TIME
 from sea_ident.recordings.recording import Recording
+from sea_ident.recordings.table import MOST_COLUMNS, RawTable, check_size, is_wanted
 
 LONGEST_HEADER = 1_000_000
 """Characters in the header row."""
 
-MOST_COLUMNS = 10_000
-"""Columns in any file."""
-
 _ROWS_AT_ONCE = 8192
 
 
-def read_csv(path: Path, names: Collection[str] | None) -> RawTable:
+def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
     """Read the columns of a CSV file.
 
     A byte-order mark, CRLF line ends, blank lines, quotes and lines that start with # before the header are
@@ -32,6 +29,7 @@ def read_csv(path: Path, names: Collection[str] | None) -> RawTable:
     Args:
         path: The file.
         names: Columns wanted besides those that bear a name of the project; all if None.
+        memory_limit: Largest size of the file [bytes].
 
     Returns:
         The table.
@@ -39,9 +37,10 @@ def read_csv(path: Path, names: Collection[str] | None) -> RawTable:
     Raises:
         RecordingError: not a CSV file with a header of names and rows of numbers; says the line and column.
     """
+    check_size(path.stat().st_size, memory_limit, path)
     text = _decode(path)
     header, start, first_line = _header(text, path)
-    wanted = [i for i, name in enumerate(header) if names is None or name in names or dimension_of(name)]
+    wanted = [i for i, name in enumerate(header) if is_wanted(name, names)]
     if not wanted:
         raise RecordingError(f"{path}: none of the columns asked for; there are: {', '.join(header)}")
     if not text[start:].strip():
@@ -61,7 +60,7 @@ def read_csv(path: Path, names: Collection[str] | None) -> RawTable:
     if table is None:
         table = _parse_slowly(text[start:], header, wanted, first_line, path)
     columns = {header[i]: table[:, k] for k, i in enumerate(wanted)}
-    return RawTable(columns, tuple(name for name in header if name not in columns))
+    return RawTable(columns, left_out=tuple(name for name in header if name not in columns))
 
 
 def write_csv(recording: Recording, path: Path) -> None:

@@ -3,35 +3,72 @@
 import warnings
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from sea_ident.exceptions import RecordingError, SeaIdentError, SeaIdentWarning
-from sea_ident.recordings import csv_file, npz_file
-from sea_ident.recordings.arrays import RawTable
+from sea_ident.recordings.alignment import ClockAlignment
 from sea_ident.recordings.assemble import assemble
-from sea_ident.recordings.atomic import atomic_file
+from sea_ident.recordings.atomic import atomic_directory, atomic_file
 from sea_ident.recordings.columns import ColumnSource, as_source
 from sea_ident.recordings.recording import Recording
+from sea_ident.recordings.table import RawTable
 
 DEFAULT_MEMORY_LIMIT = 2**31
 """Bytes that the contents of one file may take up."""
 
-SUFFIXES = (".csv", ".npz")
+
+@dataclass(frozen=True)
+class _Format:
+    """`module:function` of the reader and the writer; imported when first used."""
+
+    reader: str
+    writer: str
+
+    def read(self, path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
+        table: RawTable = _load(self.reader)(path, names, memory_limit)
+        return table
+
+    def write(self, recording: Recording, path: Path) -> None:
+        _load(self.writer)(recording, path)
+
+
+_HDF5 = _Format("hdf5_file:read_hdf5", "hdf5_file:write_hdf5")
+_ROS2_BAG = _Format("ros_reader:read_ros2_bag", "ros_writer:write_ros2_bag")
+_FORMATS = {
+    ".csv": _Format("csv_file:read_csv", "csv_file:write_csv"),
+    ".npz": _Format("npz_file:read_npz", "npz_file:write_npz"),
+    ".mat": _Format("mat_file:read_mat", "mat_file:write_mat"),
+    ".parquet": _Format("parquet_file:read_parquet", "parquet_file:write_parquet"),
+    ".h5": _HDF5,
+    ".hdf5": _HDF5,
+    ".bag": _Format("ros_reader:read_ros1_bag", "ros_writer:write_ros1_bag"),
+    ".mcap": _Format("ros_reader:read_ros2_bag", "ros_writer:write_mcap_file"),
+    ".db3": _Format("ros_reader:read_ros2_bag", "ros_writer:write_sqlite_file"),
+}
+
+SUFFIXES = tuple(_FORMATS)
+"""Suffixes that are read and written; a ROS 2 bag is a folder."""
 
 
 def read_recording(
     path: str | Path,
     *,
     columns: Mapping[str, str | ColumnSource] | None = None,
+    clocks: ClockAlignment | None = None,
     memory_limit: int = DEFAULT_MEMORY_LIMIT,
 ) -> Recording:
-    """Read a recording; the suffix decides the format.
+    """Read a recording; the suffix decides the format, and a folder is a ROS 2 bag.
 
     Args:
-        path: The file.
+        path: The file: `.csv`, `.npz`, `.mat`, `.parquet`, `.h5`, `.hdf5`, `.bag`, `.mcap`, `.db3`, or a folder.
         columns: Column of the recording -> name in the file, or `ColumnSource` with its unit, gear and so on.
-            Columns of the file that bear a name of the project already need no entry.
+            One `*` on both sides stands for the same text: `{"q_*": ColumnSource("pos_*", unit="deg")}`. Columns
+            of the file that bear a name of the project already need no entry.
+        clocks: How columns of different clocks or rates are brought together; by default by linear
+            interpolation at the sample times of the first clock, where all of them have data.
         memory_limit: Refuse files whose contents take more than this [bytes].
 
     Returns:
@@ -44,9 +81,10 @@ def read_recording(
     """
     path = Path(path)
     sources = None if columns is None else {target: as_source(value) for target, value in columns.items()}
+    names = None if sources is None else _names(sources)
     with _errors_of_libraries(path) as found:
-        table = _read(path, sources, memory_limit)
-    recording = assemble(table, sources, str(path))
+        table = _format(path).read(path, names, memory_limit)
+    recording = assemble(table, sources, clocks, str(path))
     if found:
         recording = replace(recording, warnings=(*recording.warnings, *found))
     for text in recording.warnings:
@@ -55,44 +93,58 @@ def read_recording(
 
 
 def write_recording(recording: Recording, path: str | Path) -> None:
-    """Write a recording; the suffix decides the format. The file is complete or does not appear.
+    """Write a recording; the suffix decides the format. It is complete or does not appear.
 
     Args:
         recording: What to write.
-        path: File to be written; one that exists is replaced.
+        path: File to be written, with a suffix as in `read_recording`; one that exists is replaced. Without a
+            suffix a ROS 2 bag is written, a folder with an MCAP file, which must not exist yet.
 
     Raises:
-        RecordingError: the suffix is not known, or the file cannot be written.
+        RecordingError: the suffix is not known, the format cannot hold the recording, or the file cannot be
+            written.
         MissingExtraError: the format needs a package that is not installed.
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    with atomic_file(path) as temporary:
-        if suffix == ".csv":
-            csv_file.write_csv(recording, temporary)
-        elif suffix == ".npz":
-            npz_file.write_npz(recording, temporary)
-        else:
-            raise RecordingError(_unknown_suffix(path))
+    if suffix == "":
+        with atomic_directory(path) as temporary:
+            _ROS2_BAG.write(recording, temporary)
+    elif suffix in _FORMATS:
+        with atomic_file(path) as temporary:
+            _FORMATS[suffix].write(recording, temporary)
+    else:
+        raise RecordingError(_unknown_suffix(path))
 
 
-def _read(path: Path, sources: Mapping[str, ColumnSource] | None, memory_limit: int) -> RawTable:
-    names: Collection[str] | None = None if sources is None else {how.name for how in sources.values()}
-    suffix = path.suffix.lower()
+def _load(name: str) -> Any:
+    module, function = name.split(":")
+    return getattr(import_module(f"sea_ident.recordings.{module}"), function)
+
+
+def _names(sources: Mapping[str, ColumnSource]) -> set[str]:
+    """Columns of the file that a translation uses, with wildcards."""
+    names = {how.name for how in sources.values()}
+    names |= {as_source(how.time).name for how in sources.values() if how.time is not None}
+    return names
+
+
+def _format(path: Path) -> _Format:
     if path.is_dir():
-        raise RecordingError(f"{path} is a folder")
+        from sea_ident.recordings.ros_reader import storage_files
+
+        if not storage_files(path):
+            raise RecordingError(f"{path} is a folder, and no ROS 2 bag: it holds no .mcap or .db3 file")
+        return _ROS2_BAG
     if not path.is_file():
         near = sorted(other.name for other in path.parent.glob("*") if other.suffix in SUFFIXES)[:10]
         hint = f"; that folder has {', '.join(near)}" if near else ""
         raise RecordingError(f"{path}: no such file{hint}")
-    size = path.stat().st_size
-    if size > memory_limit:
-        raise RecordingError(f"{path}: {size} bytes, over the limit of {memory_limit}; see memory_limit")
-    if suffix == ".csv":
-        return csv_file.read_csv(path, names)
-    if suffix == ".npz":
-        return npz_file.read_npz(path, memory_limit)
-    raise RecordingError(_unknown_suffix(path))
+    if path.suffix.lower() not in _FORMATS:
+        raise RecordingError(_unknown_suffix(path))
+    if path.stat().st_size == 0:
+        raise RecordingError(f"{path}: the file is empty")
+    return _FORMATS[path.suffix.lower()]
 
 
 def _unknown_suffix(path: Path) -> str:
@@ -113,10 +165,12 @@ def _errors_of_libraries(path: Path) -> Iterator[list[str]]:
             yield found
         except SeaIdentError:
             raise
+        except PermissionError as error:
+            raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
         except Exception as error:
             what = " ".join(str(error).split())[:300] or "no further explanation"
             raise RecordingError(
-                f"{path}: cannot be read as {path.suffix.lower() or 'a recording'}: "
+                f"{path}: cannot be read as {path.suffix.lower() or 'a ROS 2 bag'}: "
                 f"{type(error).__name__}: {what}. "
                 "The file is damaged, cut off, or of another format than its name says"
             ) from error

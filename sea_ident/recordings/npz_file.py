@@ -1,26 +1,28 @@
 """NPZ: one array per column, as numpy.savez writes it. Nothing is ever unpickled."""
 
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident.exceptions import RecordingError
-from sea_ident.recordings.arrays import RawTable, table_of_arrays
 from sea_ident.recordings.naming import TIME
 from sea_ident.recordings.recording import Recording
+from sea_ident.recordings.table import RawTable, check_size, table_of_arrays
 
 _LONGEST_ARRAY_HEADER = 10_000
 
 
-def read_npz(path: Path, memory_limit: int) -> RawTable:
+def read_npz(path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
     """Read the numeric arrays of an NPZ file.
 
     Sizes are checked against the archive's directory and each array's header before anything is allocated.
 
     Args:
         path: The file.
+        names: Not needed: arrays are read anyway.
         memory_limit: Largest size of all arrays together [bytes].
 
     Returns:
@@ -31,9 +33,7 @@ def read_npz(path: Path, memory_limit: int) -> RawTable:
     """
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
-        total = sum(member.file_size for member in members)
-        if total > memory_limit:
-            raise RecordingError(f"{path}: unpacks to {total} bytes, over the limit of {memory_limit}")
+        check_size(sum(member.file_size for member in members), memory_limit, path)
         names = [member.filename.removesuffix(".npy") for member in members]
         arrays = (_read_member(archive, member, path) for member in members)
         return table_of_arrays(zip(names, arrays, strict=True), str(path))
