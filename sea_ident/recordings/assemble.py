@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 
+import numpy as np
+
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings.alignment import ClockAlignment, Stream, align_streams
@@ -59,9 +61,12 @@ def assemble(
     if left_out:
         notes.append(f"left out of the file: {', '.join(left_out)}")
     streams = _streams(sources, table, source, translated=columns is not None)
-    if len(streams) == 1 and (clocks is None or clocks == ClockAlignment()):
-        only = streams[0]
-        return Recording(only.time, only.columns, source, notes=tuple(notes))
+    first = streams[0]
+    if (clocks is None or clocks == ClockAlignment()) and all(
+        np.array_equal(stream.time, first.time) for stream in streams
+    ):
+        together = {name: values for stream in streams for name, values in stream.columns.items()}
+        return Recording(first.time, together, source, notes=tuple(notes))
     aligned = align_streams(streams, clocks, source=source).recording
     return replace(aligned, notes=(*notes, *aligned.notes))
 

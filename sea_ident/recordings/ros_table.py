@@ -169,7 +169,7 @@ def table_of_topics(topics: list[TopicCollector], left_out: list[str], source: s
     for topic, stamps, signals, values, _ in parts:
         count[topic] = count.get(topic, 0) + 1
         clock = f"{topic}:{TIME}" if count[topic] == 1 else f"{topic}#{count[topic]}:{TIME}"
-        columns[clock] = np.array([stamp - origin for stamp in stamps], dtype=np.float64) * 1e-9
+        columns[clock] = np.array([stamp - origin for stamp in stamps], dtype=np.float64) / 1e9
         for k, (name, joint) in enumerate(signals):
             column = column_name(topic, name, joint)
             if column in columns:
