@@ -12,6 +12,8 @@ from pkgutil import iter_modules
 from typing import Any
 
 from sea_ident.effects.base import (
+    Action,
+    Anchor,
     Column,
     Contribution,
     Effect,
@@ -20,21 +22,27 @@ from sea_ident.effects.base import (
     Side,
     SimulationState,
     State,
+    corrected_motion,
     smooth_sign,
 )
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 
 __all__ = [
+    "Action",
+    "Anchor",
     "Column",
     "Contribution",
     "Effect",
     "JointEffect",
     "Shape",
     "Side",
+    "Signals",
+    "SimulatedTorque",
     "SimulationState",
     "State",
     "base_effects",
+    "corrected_motion",
     "effect_classes",
     "effect_from_dict",
     "make_effect",
@@ -70,7 +78,7 @@ def _register(found: dict[str, type[Effect]], effect: type[Effect], where: str) 
     found[effect.name] = effect
 
 
-def make_effect(name: str, joint: str | None = None, **shape: float) -> Effect:
+def make_effect(name: str, joint: str | None = None, **shape: Any) -> Effect:
     """An effect by its name.
 
     Args:

@@ -12,11 +12,12 @@ and their sum is the row of a rigid joint, in which the spring cancels (paper, e
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, ClassVar
+from itertools import product
+from typing import Any, ClassVar, Protocol, Protocol, Self
 
 import numpy as np
 import pinocchio as pin
@@ -68,6 +69,7 @@ class Shape:
         lower: smallest value that makes physical sense.
         upper: largest value that makes physical sense.
         logarithmic: whether a search should step by factors rather than differences.
+        points: number of values that a search tries before it refines the best.
     """
 
     name: str
@@ -75,9 +77,11 @@ class Shape:
     lower: float
     upper: float
     logarithmic: bool = True
+    points: int = 6
 
-    def grid(self, points: int) -> FloatArray:
-        """(points,) values from `lower` to `upper`."""
+    def grid(self, points: int | None = None) -> FloatArray:
+        """(points,) values from `lower` to `upper`; `points` of the shape by default."""
+        points = self.points if points is None else points
         if self.logarithmic:
             return np.geomspace(self.lower, self.upper, points)
         return np.linspace(self.lower, self.upper, points)
@@ -155,8 +159,11 @@ class SimulationState:
         dq: (n,) link velocities.
         theta: (n,) motor positions after the gear.
         dtheta: (n,) motor velocities after the gear.
-        tau_spring: (n,) spring torques [N m].
+        tau_spring: (n,) spring torques, 0 at a rigid joint [N m].
         tau_motor: (n,) commanded motor torques at the joint side [N m].
+        elapsed: time since the last step that was accepted [s].
+        period_index: number of the recorded period, 0 while settling.
+        temperature: (n,) of the motors, None where the simulation has none [degC].
     """
 
     time: float
@@ -166,6 +173,87 @@ class SimulationState:
     dtheta: FloatArray
     tau_spring: FloatArray
     tau_motor: FloatArray
+    elapsed: float = 0.0
+    period_index: int = 0
+    temperature: FloatArray | None = None
+
+
+class SimulatedTorque(Protocol):
+    """How an effect acts in a running simulation.
+
+    Called several times per step with trial states, so a call must not change what the effect remembers. An effect
+    with memory also has a method ``accept(state)``, called once with the state at the end of every step; a trial state
+    lies `elapsed` after the last accepted one.
+    """
+
+    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray, /) -> None:
+        """Add the torque to the link rows (n,) and the motor rows (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What perfect sensors of a simulated robot would read; effects in the signal chain return a changed copy.
+
+    Attributes:
+        time: (N,) [s].
+        q: (N, n) link positions.
+        dq: (N, n) link velocities.
+        theta: (N, n) motor positions after the gear.
+        dtheta: (N, n) motor velocities after the gear.
+        tau_motor: (N, n) motor torques at the joint side [N m].
+        tau_spring: (N, n) spring torques [N m].
+        period: [s], None where the motion does not repeat.
+    """
+
+    time: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    theta: FloatArray
+    dtheta: FloatArray
+    tau_motor: FloatArray
+    tau_spring: FloatArray
+    period: float | None
+
+
+class Action(Protocol):
+    """How an effect acts in a simulation.
+
+    An effect with memory gives an action that also has a method ``accept(state)``: the simulator calls it with every
+    state that it keeps, and then only does the memory move on (trial steps and steps back leave it as it is).
+    """
+
+    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+        """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """What the rest of a model says, for effects whose columns depend on it (the load of a joint, its friction).
+
+    Attributes:
+        robot: the robot.
+        effects: effects of the model.
+        parameters: value of every parameter by name; what is not in it counts as zero.
+    """
+
+    robot: Robot
+    effects: tuple["Effect", ...]
+    parameters: Mapping[str, float]
+
+    def value(self, name: str) -> float:
+        """Value of one parameter, 0 where the model has no such parameter."""
+        return float(self.parameters.get(name, 0.0))
+
+    def inertial(self) -> tuple[float, ...]:
+        """(10 b,) standard inertial parameters, body by body."""
+        return tuple(self.value(name) for name in self.robot.inertial_names)
+
+    def smoothing(self, joint: str) -> float | None:
+        """v_off of the Coulomb friction of a joint [rad/s], None where the model has none."""
+        for effect in self.effects:
+            if effect.joint == joint and effect.name == "coulomb_friction":
+                return effect.shape_values.get("smoothing")
+        return None
 
 
 @dataclass(frozen=True)
@@ -200,7 +288,7 @@ class Effect(ABC):
         """(k,) values that the robot's description gives to its parameters, NaN where it gives none."""
         return np.full(len(self.columns(robot)), np.nan)
 
-    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
         """How it acts in a simulation.
 
         Args:
@@ -215,6 +303,56 @@ class Effect(ABC):
             EffectError: if it cannot act in a simulation as a torque of the present state.
         """
         raise EffectError(f"the effect {self.name!r} cannot be simulated as a torque of the present state")
+
+    def modified(self, robot: Robot, values: FloatArray) -> Robot:
+        """The robot with this effect in its bodies or its gravity; by default the robot as it is.
+
+        A simulator asks every effect for both, `modified` and `torque`: what changes the masses cannot be a torque
+        of the present state.
+        """
+        return robot
+
+    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """What the sensors show where the effect sits in a sensor; by default all signals as they are.
+
+        Args:
+            robot: the robot.
+            time: (N,) [s].
+            signals: true signals (N, n) by kind: q, theta, tau_motor, tau_spring.
+
+        Returns:
+            The signals as recorded.
+        """
+        return dict(signals)
+
+    def corrected(self, robot: Robot, motion: Motion) -> Motion:
+        """The motion as it was, from the motion as the sensors show it; by default they are the same."""
+        return motion
+
+    def shifted(self, robot: Robot, time: FloatArray, rows: Contribution) -> Contribution:
+        """Rows as the recorded torque shows them; by default they are the same."""
+        return rows
+
+    def variants(self, state: State) -> tuple[Self, ...]:
+        """The same effect with all the shapes that a search should try on this motion."""
+        if not self.shapes:
+            return (self,)
+        grids = [shape.grid() for shape in self.shapes]
+        names = [shape.name for shape in self.shapes]
+        return tuple(
+            replace(self, **dict(zip(names, map(float, values), strict=True)))  # type: ignore[arg-type]
+            for values in product(*grids)
+        )
+
+    def anchored(self, anchor: Anchor) -> Self:
+        """The same effect, knowing what it needs of the rest of the model; by default it needs nothing."""
+        return self
+
+    def shape_unit(self, shape: Shape, robot: Robot) -> str:
+        """Unit of a shape parameter at this joint: m in place of rad where the joint slides."""
+        if self.joint is not None and robot.joints[robot.index(self.joint)].prismatic:
+            return shape.unit.replace("N m", "N").replace("rad", "m")
+        return shape.unit
 
     def parameter_name(self, label: str | None = None) -> str:
         """`<joint>.<effect>` or `<joint>.<effect>_<label>`."""
@@ -246,7 +384,7 @@ class JointEffect(Effect):
         columns = self.local_columns(motion.q[:, i], motion.dq[:, i], motion.theta[:, i], motion.dtheta[:, i])
         return state.at(self.side, joint, columns)
 
-    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The columns at the present state, times the values."""
         i = robot.index(self.required_joint)
         on_link = {Side.LINK: 1.0, Side.SPRING: -1.0}.get(self.side, 0.0)
@@ -277,6 +415,13 @@ class JointEffect(Effect):
         """Units of torque and of position of its joint: (N m, rad) or (N, m)."""
         joint = robot.joints[robot.index(self.required_joint)]
         return joint.torque_unit, joint.position_unit
+
+
+def corrected_motion(robot: Robot, effects: Sequence[Effect], motion: Motion) -> Motion:
+    """The motion with the errors of all sensors taken out that the effects of a model describe."""
+    for effect in effects:
+        motion = effect.corrected(robot, motion)
+    return motion
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:
