@@ -11,8 +11,7 @@ import pytest
 from lxml import etree
 
 from sea_ident.exceptions import SeaIdentWarning
-from sea_ident.robot import Robot, load_robot, robots_folder
-from sea_ident.robot.load import example_robots_folder
+from sea_ident.robot import Robot, example_robots_folder, load_robot, robots_folder
 
 ROBOTS = {
     "exo_leg": ("hip", "knee", "ankle"),

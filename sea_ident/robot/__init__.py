@@ -2,8 +2,15 @@
 
 from sea_ident.robot.actuator import Actuator, SeriesElasticActuator
 from sea_ident.robot.limits import Limits
-from sea_ident.robot.load import find_urdf, load_robot, robot_from_text, robots_folder, shipped_robots
+from sea_ident.robot.load import load_robot, robot_from_text
 from sea_ident.robot.model import INERTIAL_NAMES, INERTIAL_UNITS, Joint, Robot
+from sea_ident.robot.sources import (
+    example_robots_folder,
+    find_urdf,
+    robots_folder,
+    shipped_annotations,
+    shipped_robots,
+)
 
 __all__ = [
     "INERTIAL_NAMES",
@@ -13,9 +20,11 @@ __all__ = [
     "Limits",
     "Robot",
     "SeriesElasticActuator",
+    "example_robots_folder",
     "find_urdf",
     "load_robot",
     "robot_from_text",
     "robots_folder",
+    "shipped_annotations",
     "shipped_robots",
 ]

@@ -8,7 +8,8 @@ from lxml import etree
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError
 from sea_ident.robot.actuator import Actuator, SeriesElasticActuator
-from sea_ident.robot.urdf import UrdfTree, number, vector
+from sea_ident.robot.urdf import MOVING_TYPES, UrdfTree
+from sea_ident.robot.xml import number, vector
 
 SERIES_ELASTIC = "sea_ident/SeriesElastic"
 LINEAR_LIMIT = "sea_ident/LinearLimit"
@@ -41,7 +42,7 @@ class Annotation:
         actuators: actuator of each joint that has one.
         limits: further limits of each joint: acceleration, jerk, deflection, torque.
         combinations: limits on linear combinations of joint positions.
-        ignored: transmissions of other types, that say nothing to sea_ident.
+        ignored: types of the transmissions that are not read.
     """
 
     actuators: dict[str, Actuator]
@@ -143,22 +144,31 @@ def _actuator(transmission: etree._Element, joint: str, tree: UrdfTree, where: s
     )  # fmt: skip
 
 
+def _known_joint(name: str, tree: UrdfTree, where: str) -> str:
+    if name not in tree.joints:
+        known = [joint.name for joint in tree.joints.values() if joint.type in MOVING_TYPES]
+        raise RobotError(
+            f"{where}: names the joint {name!r}, which is not in {tree.file}; its joints: {', '.join(known)}"
+        )
+    kind = tree.joints[name].type
+    if kind not in MOVING_TYPES:
+        raise RobotError(f"{where}: names the joint {name!r}, which is {kind}; a motor needs a joint that moves")
+    return name
+
+
 def _one_joint(transmission: etree._Element, tree: UrdfTree, where: str) -> str:
     elements = transmission.findall("joint")
     if len(elements) != 1:
         raise RobotError(f"{where}: has {len(elements)} <joint>; exactly one is read")
-    joint = str(elements[0].get("name", ""))
-    if joint not in tree.joints:
-        raise RobotError(f"{where}: names the joint {joint!r}, which is not in {tree.file}")
-    return joint
+    return _known_joint(str(elements[0].get("name", "")), tree, where)
 
 
 def _linear_limit(transmission: etree._Element, tree: UrdfTree, where: str) -> LinearLimit:
     coefficients: dict[str, float] = {}
     for element in transmission.findall("joint"):
-        joint = element.get("name", "")
-        if joint not in tree.joints:
-            raise RobotError(f"{where}: names the joint {joint!r}, which is not in {tree.file}")
+        joint = _known_joint(element.get("name", ""), tree, where)
+        if joint in coefficients:
+            raise RobotError(f"{where}: names the joint {joint!r} twice; name it once")
         value = _text_number(element, "coefficient", where, positive=False)
         coefficients[joint] = 1.0 if value is None else value
     limit = transmission.find("limit")
@@ -210,10 +220,9 @@ def parse_annotation(root: etree._Element, file: str, tree: UrdfTree) -> Annotat
         if kind not in (SERIES_ELASTIC, RIGID):
             if kind.startswith("sea_ident/"):
                 raise RobotError(f"{where}: unknown type {kind!r}; use {SERIES_ELASTIC} or {LINEAR_LIMIT}")
-            ignored.append(name)
+            ignored.append(kind or "no type")
             continue
         if kind == RIGID and _says_nothing(transmission):
-            ignored.append(name)
             continue
         joint = _one_joint(transmission, tree, where)
         if joint in actuators:
@@ -226,4 +235,4 @@ def parse_annotation(root: etree._Element, file: str, tree: UrdfTree) -> Annotat
             for key, value in limits[joint].items():
                 if value <= 0.0:
                     raise RobotError(f"{where}: the {key} limit is {value}; it must be positive")
-    return Annotation(actuators, limits, tuple(combinations), tuple(ignored))
+    return Annotation(actuators, limits, tuple(combinations), tuple(dict.fromkeys(ignored)))

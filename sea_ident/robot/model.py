@@ -234,12 +234,38 @@ class Robot:
         return self.mass_matrices(q)[0]
 
     def coupling(self, q: FloatArray) -> FloatArray:
-        """S(q): (n, n) coupling between motors (rows) and links (columns) [kg m2] (paper, eq. 2)."""
+        """S(q): (n, n) coupling between motors (rows) and links (columns) [kg m2] (paper, eq. 2).
+
+        Constant and strictly lower triangular where all axes are parallel and every motor sits before its joint;
+        otherwise it depends on q.
+        """
         return self.mass_matrices(q)[1]
 
     def motor_inertia(self, q: FloatArray) -> FloatArray:
         """B(q): (n, n) motor inertia after the gear [kg m2] (paper, eq. 2)."""
         return self.mass_matrices(q)[2]
+
+    def gyroscopic_terms(self, q: FloatArray, dq: FloatArray, dtheta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What turning rotors add when their axes turn: zero where motor axes are parallel to all link axes.
+
+        Args:
+            q: (n,) link positions [rad].
+            dq: (n,) link velocities [rad/s].
+            dtheta: (n,) motor velocities after the gear [rad/s].
+
+        Returns:
+            C1(q, theta') q' (n,) in the link rows, bilinear in q' and theta', and C2(q, q') q' (n,) in the motor rows
+            [N m] (paper, eqs. 1-2).
+        """
+        model, data = self.extended_model, self.extended_model.createData()
+        x, rest = self.extended_state(np.asarray(q, dtype=float)), np.zeros(self.extended_model.nv)
+        turning = self.extended_rate(np.asarray(dq, dtype=float), np.asarray(dtheta, dtype=float))
+        at_rest = self.extended_rate(np.asarray(dq, dtype=float), np.zeros(self.n))
+        with_rotors = pin.rnea(model, data, x, turning, rest).copy()
+        without = pin.rnea(model, data, x, at_rest, rest)
+        first: FloatArray = self.link_map.T @ (with_rotors - without)
+        second: FloatArray = self.motor_map.T @ with_rotors
+        return first, second
 
     def summary(self) -> str:
         """A table of joints and actuators."""
@@ -253,6 +279,8 @@ class Robot:
                 f"  {joint.name:<{width}}  {joint.type:<10} {kind:<7}  "
                 f"[{lower:.4g}, {upper:.4g}] {joint.position_unit}{gear}"
             )
+        held = ", ".join(f"{name} at {value:.4g}" for name, value in self.locked.items())
+        lines.extend([f"  locked: {held}"] if held else [])
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
 

@@ -1,10 +1,9 @@
-"""Reading of URDF text: safe XML, the kinematic tree, and the checks that Pinocchio does not make.
+"""Reading of URDF text: the kinematic tree, and the checks that Pinocchio does not make.
 
 Only what rigid-body dynamics needs is looked at; geometry is left alone, so missing meshes do not matter.
 """
 
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,13 @@ from lxml import etree
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError
+from sea_ident.robot.xml import number, parse_xml, vector
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 REFUSED_TYPES = ("floating", "planar", "spherical", "ball")
-LARGEST_FILE = 64 * 2**20
+# Pinocchio's reader recurses along the chain: some thousand links in a row overflow the stack.
+LONGEST_CHAIN = 1000
+MOST_LINKS = 10000
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,8 @@ class JointElement:
         parent: name of the parent link.
         child: name of the child link.
         axis: (3,) unit axis in the joint frame [-].
-        rotation: (3, 3) orientation of the joint frame in the parent link [-].
+        origin: (3,) position of the joint frame in the parent link [m].
+        rpy: (3,) its roll, pitch, yaw [rad].
         lower: lowest position [rad] or [m].
         upper: highest position [rad] or [m].
         velocity: largest speed [rad/s] or [m/s].
@@ -52,7 +55,8 @@ class JointElement:
     parent: str
     child: str
     axis: FloatArray
-    rotation: FloatArray
+    origin: FloatArray
+    rpy: FloatArray
     lower: float
     upper: float
     velocity: float
@@ -60,6 +64,28 @@ class JointElement:
     damping: float | None
     friction: float | None
     mimic: Mimic | None
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(3, 3) orientation of the joint frame in the parent link [-]."""
+        return rotation_from_rpy(self.rpy)
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass properties of a link as its URDF states them.
+
+    Attributes:
+        mass: [kg].
+        centre: (3,) centre of mass in the link frame [m].
+        rpy: (3,) roll, pitch, yaw of the frame of the tensor [rad].
+        tensor: (3, 3) inertia about the centre of mass, in that frame [kg m2].
+    """
+
+    mass: float
+    centre: FloatArray
+    rpy: FloatArray
+    tensor: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +98,7 @@ class UrdfTree:
         file: where it came from, for messages.
         root: the parsed XML.
         base: name of the root link.
-        links: link names to mass [kg] (0 where there is no inertial).
+        links: link names to their inertial, None where they state none.
         joints: joints by name, in file order.
     """
 
@@ -81,7 +107,7 @@ class UrdfTree:
     file: str
     root: etree._Element
     base: str
-    links: dict[str, float]
+    links: dict[str, Inertial | None]
     joints: dict[str, JointElement]
 
     def path_to_root(self, link: str) -> tuple[str, ...]:
@@ -91,68 +117,6 @@ class UrdfTree:
         while path[-1] in parent_of:
             path.append(parent_of[path[-1]])
         return tuple(path)
-
-
-def parse_xml(text: str | bytes, file: str) -> etree._Element:
-    """Parse XML without entities, DTDs or network.
-
-    Args:
-        text: the XML.
-        file: where it came from, for messages.
-
-    Returns:
-        The root element.
-
-    Raises:
-        RobotError: if it is not well-formed, or carries a document type.
-    """
-    data = text.encode() if isinstance(text, str) else text
-    if len(data) > LARGEST_FILE:
-        raise RobotError(f"{file}: {len(data)} bytes is too large for a URDF (at most {LARGEST_FILE})")
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
-    try:
-        root = etree.fromstring(data, parser)
-    except (etree.XMLSyntaxError, ValueError) as error:
-        raise RobotError(f"{file}: malformed XML: {error}; correct the file") from None
-    if root.getroottree().docinfo.doctype:
-        raise RobotError(f"{file}: carries a DOCTYPE, which is not read for safety; remove it")
-    return root
-
-
-def number(element: etree._Element, attribute: str, default: float | None, where: str) -> float:
-    """A finite number from an attribute.
-
-    Raises:
-        RobotError: if the attribute is missing without a default, not a number, or not finite.
-    """
-    text = element.get(attribute)
-    if text is None:
-        if default is None:
-            raise RobotError(f"{where}: <{element.tag}> has no attribute {attribute!r}; add it")
-        return default
-    try:
-        value = float(text)
-    except ValueError:
-        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not a number") from None
-    if not isfinite(value):
-        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not finite")
-    return value
-
-
-def vector(element: etree._Element | None, attribute: str, default: str, where: str) -> FloatArray:
-    """Three finite numbers from an attribute.
-
-    Raises:
-        RobotError: if there are not three finite numbers.
-    """
-    text = default if element is None else element.get(attribute, default)
-    try:
-        value = np.array([float(part) for part in text.split()])
-    except ValueError:
-        raise RobotError(f"{where}: {attribute}={text!r} is not three numbers") from None
-    if value.shape != (3,) or not np.all(np.isfinite(value)):
-        raise RobotError(f"{where}: {attribute}={text!r} is not three finite numbers")
-    return value
 
 
 def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
@@ -167,27 +131,25 @@ def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     )
 
 
-def _link_mass(link: etree._Element, where: str) -> float:
+def _inertial(link: etree._Element, where: str) -> Inertial | None:
     inertial = link.find("inertial")
     if inertial is None:
-        return 0.0
-    mass_element = inertial.find("mass")
-    if mass_element is None:
-        raise RobotError(f"{where}: <inertial> has no <mass>; add it or remove the <inertial>")
+        return None
+    mass_element, tensor_element, origin = (inertial.find(tag) for tag in ("mass", "inertia", "origin"))
+    for tag, element in (("mass", mass_element), ("inertia", tensor_element)):
+        if element is None:
+            raise RobotError(f"{where}: <inertial> has no <{tag}>; add it or remove the <inertial>")
     mass = number(mass_element, "value", None, where)
     if mass < 0.0:
         raise RobotError(f"{where}: mass is {mass} kg; a mass cannot be negative")
-    vector(inertial.find("origin"), "xyz", "0 0 0", where)
-    vector(inertial.find("origin"), "rpy", "0 0 0", where)
-    tensor = inertial.find("inertia")
-    if tensor is not None:
-        for name in ("ixx", "iyy", "izz"):
-            value = number(tensor, name, 0.0, where)
-            if value < -1e-12:  # CAD exports write a zero as -5e-20
-                raise RobotError(f"{where}: {name} is {value} kg m2; a moment of inertia cannot be negative")
-        for name in ("ixy", "ixz", "iyz"):
-            number(tensor, name, 0.0, where)
-    return mass
+    tensor = np.zeros((3, 3))
+    for i, name in enumerate(("ixx", "iyy", "izz")):
+        tensor[i, i] = number(tensor_element, name, None, where)
+        if tensor[i, i] < -1e-12:  # CAD exports write a zero as -5e-20
+            raise RobotError(f"{where}: {name} is {tensor[i, i]} kg m2; a moment of inertia cannot be negative")
+    for (i, j), name in (((0, 1), "ixy"), ((0, 2), "ixz"), ((1, 2), "iyz")):
+        tensor[i, j] = tensor[j, i] = number(tensor_element, name, 0.0, where)
+    return Inertial(mass, vector(origin, "xyz", "0 0 0", where), vector(origin, "rpy", "0 0 0", where), tensor)
 
 
 def _joint(element: etree._Element, file: str) -> JointElement:
@@ -214,15 +176,18 @@ def _joint(element: etree._Element, file: str) -> JointElement:
     inf = float("inf")
     lower, upper, velocity, effort = -inf, inf, inf, inf
     if limit is not None:
-        velocity = abs(number(limit, "velocity", inf, where)) or inf
-        effort = abs(number(limit, "effort", inf, where)) or inf
+        velocity = abs(number(limit, "velocity", inf, where, finite=False)) or inf
+        effort = abs(number(limit, "effort", inf, where, finite=False)) or inf
         if kind in ("revolute", "prismatic"):
             # URDF: an omitted bound of a limited joint is zero; both zero means that none was stated.
-            lower, upper = number(limit, "lower", 0.0, where), number(limit, "upper", 0.0, where)
+            lower = number(limit, "lower", 0.0, where, finite=False)
+            upper = number(limit, "upper", 0.0, where, finite=False)
             if lower > upper:
                 raise RobotError(f"{where}: lower limit {lower} is above upper limit {upper}; exchange them")
-            if lower == upper:
+            if lower == upper == 0.0:
                 lower, upper = -inf, inf
+            if lower == upper:
+                raise RobotError(f"{where}: lower and upper limit are both {lower}; widen them, or make it fixed")
     mimic = None
     if mimic_element is not None:
         mimic = Mimic(
@@ -238,14 +203,14 @@ def _joint(element: etree._Element, file: str) -> JointElement:
             if value is not None and value < 0.0:
                 raise RobotError(f"{where}: {label} is {value}; it cannot be negative")
     origin = element.find("origin")
-    vector(origin, "xyz", "0 0 0", where)
     return JointElement(
         name=name,
         type=kind,
         parent=ends["parent"],
         child=ends["child"],
         axis=axis,
-        rotation=rotation_from_rpy(vector(origin, "rpy", "0 0 0", where)),
+        origin=vector(origin, "xyz", "0 0 0", where),
+        rpy=vector(origin, "rpy", "0 0 0", where),
         lower=lower,
         upper=upper,
         velocity=velocity,
@@ -273,14 +238,14 @@ def parse_urdf(text: str | bytes, file: str) -> UrdfTree:
     if root.tag != "robot":
         hint = "; expand it with xacro first" if "xacro" in str(root.tag) else ""
         raise RobotError(f"{file}: the root element is <{root.tag}>, not <robot>{hint}")
-    links: dict[str, float] = {}
+    links: dict[str, Inertial | None] = {}
     for link in root.findall("link"):
         name = link.get("name", "")
         if not name:
             raise RobotError(f"{file}: a <link> (line {link.sourceline}) has no name")
         if name in links:
             raise RobotError(f"{file}: two links are named {name!r}; rename one")
-        links[name] = _link_mass(link, f"{file}: link {name!r}")
+        links[name] = _inertial(link, f"{file}: link {name!r}")
     joints: dict[str, JointElement] = {}
     for element in root.findall("joint"):
         joint = _joint(element, file)
@@ -288,13 +253,17 @@ def parse_urdf(text: str | bytes, file: str) -> UrdfTree:
             raise RobotError(f"{file}: two joints are named {joint.name!r}; rename one")
         joints[joint.name] = joint
     if not links:
+        if root.find("transmission") is not None:
+            raise RobotError(f"{file}: has transmissions but no <link>: it is an annotation; give it with its robot")
         raise RobotError(f"{file}: has no <link>; is it a URDF?")
+    if len(links) > MOST_LINKS:
+        raise RobotError(f"{file}: has {len(links)} links; at most {MOST_LINKS} are read")
     base = _check_tree(links, joints, file)
     decoded = text if isinstance(text, str) else text.decode("utf-8", errors="replace")
     return UrdfTree(root.get("name") or Path(file).stem, decoded, file, root, base, links, joints)
 
 
-def _check_tree(links: dict[str, float], joints: dict[str, JointElement], file: str) -> str:
+def _check_tree(links: dict[str, Inertial | None], joints: dict[str, JointElement], file: str) -> str:
     """The name of the single root link, or an error that says why this is not a tree."""
     parent_joint: dict[str, str] = {}
     for joint in joints.values():
@@ -307,22 +276,24 @@ def _check_tree(links: dict[str, float], joints: dict[str, JointElement], file: 
                 f"{joint.name!r}: a closed loop. Cut the loop: remove one of the two joints"
             )
         parent_joint[joint.child] = joint.name
-        if joint.mimic is not None and (joint.mimic.joint not in joints or joint.mimic.joint == joint.name):
-            raise RobotError(f"{file}: joint {joint.name!r} mimics {joint.mimic.joint!r}, which does not exist")
     roots = [link for link in links if link not in parent_joint]
     if not roots:
         raise RobotError(f"{file}: no link is a root: the joints form a closed loop. Remove one joint of it")
     if len(roots) > 1:
         raise RobotError(f"{file}: several root links: {', '.join(roots)}; connect them by fixed joints")
-    reached, children = {roots[0]}, [roots[0]]
+    depth, children = {roots[0]: 0}, [roots[0]]
     by_parent: dict[str, list[str]] = {}
     for joint in joints.values():
         by_parent.setdefault(joint.parent, []).append(joint.child)
     while children:
-        for child in by_parent.get(children.pop(), []):
-            reached.add(child)
+        parent = children.pop()
+        for child in by_parent.get(parent, []):
+            depth[child] = depth[parent] + 1
             children.append(child)
-    if len(reached) < len(links):
-        lost = ", ".join(sorted(set(links) - reached))
+    if len(depth) < len(links):
+        lost = ", ".join(sorted(set(links) - set(depth)))
         raise RobotError(f"{file}: the links {lost} form a closed loop. Remove one of its joints")
+    longest = max(depth.values())
+    if longest > LONGEST_CHAIN:
+        raise RobotError(f"{file}: {longest} joints follow each other in a chain; at most {LONGEST_CHAIN} are read")
     return roots[0]
