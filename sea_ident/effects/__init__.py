@@ -37,8 +37,6 @@ __all__ = [
     "JointEffect",
     "Shape",
     "Side",
-    "Signals",
-    "SimulatedTorque",
     "SimulationState",
     "State",
     "base_effects",

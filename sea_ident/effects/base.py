@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import product
-from typing import Any, ClassVar, Protocol, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import pinocchio as pin
@@ -129,6 +129,15 @@ class State:
             out[k] = compute(model, data, x[k], v[k], a[k])
         return out
 
+    def body_rows(self, inertial: FloatArray) -> Contribution:
+        """Link and motor rows (N, n, 1) of the links with the standard inertial parameters (10 b,)."""
+        take = (10 * (self.robot.body_indices - 1)[:, None] + range(10)).ravel()
+        return self.rows((self.extended_regressor[:, :, take] @ inertial)[:, :, None])
+
+    def body_torque(self, inertial: FloatArray) -> FloatArray:
+        """(N, n) torque that the links with these standard inertial parameters (10 b,) need [N m]."""
+        return self.body_rows(inertial).link[:, :, 0]
+
     def rows(self, extended: FloatArray) -> Contribution:
         """Link and motor rows of (N, nv, k) columns of the extended model."""
         return Contribution(
@@ -178,48 +187,12 @@ class SimulationState:
     temperature: FloatArray | None = None
 
 
-class SimulatedTorque(Protocol):
-    """How an effect acts in a running simulation.
-
-    Called several times per step with trial states, so a call must not change what the effect remembers. An effect
-    with memory also has a method ``accept(state)``, called once with the state at the end of every step; a trial state
-    lies `elapsed` after the last accepted one.
-    """
-
-    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray, /) -> None:
-        """Add the torque to the link rows (n,) and the motor rows (n,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Signals:
-    """What perfect sensors of a simulated robot would read; effects in the signal chain return a changed copy.
-
-    Attributes:
-        time: (N,) [s].
-        q: (N, n) link positions.
-        dq: (N, n) link velocities.
-        theta: (N, n) motor positions after the gear.
-        dtheta: (N, n) motor velocities after the gear.
-        tau_motor: (N, n) motor torques at the joint side [N m].
-        tau_spring: (N, n) spring torques [N m].
-        period: [s], None where the motion does not repeat.
-    """
-
-    time: FloatArray
-    q: FloatArray
-    dq: FloatArray
-    theta: FloatArray
-    dtheta: FloatArray
-    tau_motor: FloatArray
-    tau_spring: FloatArray
-    period: float | None
-
-
 class Action(Protocol):
     """How an effect acts in a simulation.
 
     An effect with memory gives an action that also has a method ``accept(state)``: the simulator calls it with every
-    state that it keeps, and then only does the memory move on (trial steps and steps back leave it as it is).
+    state that it keeps, and then only does the memory move on (trial steps and steps back leave it as it is). A trial
+    state lies `elapsed` after the last one that was kept. Each simulation asks for a new action.
     """
 
     def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
@@ -311,6 +284,10 @@ class Effect(ABC):
         of the present state.
         """
         return robot
+
+    def added_inertia(self, robot: Robot, values: FloatArray) -> FloatArray:
+        """(2 n, 2 n) constant symmetric matrix that it adds to the mass matrix over (q'', theta'') [kg m2]."""
+        return np.zeros((2 * robot.n, 2 * robot.n))
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """What the sensors show where the effect sits in a sensor; by default all signals as they are.
