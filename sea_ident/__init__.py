@@ -13,6 +13,8 @@ _HOME = {
     "FourierSeries": "motion",
     "build_regressor": "regressor",
     "find_base_parameters": "base_parameters",
+    "simulate": "simulation",
+    "Simulation": "simulation",
     "SeaIdentError": "exceptions",
     "SeaIdentWarning": "exceptions",
 }
@@ -23,9 +25,11 @@ __all__ = [
     "Robot",
     "SeaIdentError",
     "SeaIdentWarning",
+    "Simulation",
     "build_regressor",
     "find_base_parameters",
     "load_robot",
+    "simulate",
 ]
 
 if TYPE_CHECKING:
@@ -34,6 +38,7 @@ if TYPE_CHECKING:
     from sea_ident.motion import FourierSeries, Motion
     from sea_ident.regressor import build_regressor
     from sea_ident.robot import Robot, load_robot
+    from sea_ident.simulation import Simulation, simulate
 
 
 def __getattr__(name: str) -> Any:

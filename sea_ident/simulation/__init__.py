@@ -1,0 +1,27 @@
+"""Closed-loop forward dynamics of the elastic robot, and what its sensors see."""
+
+from sea_ident.simulation.controller import ComputedTorque, Controller, VelocityController
+from sea_ident.simulation.friction import FrictionJitter, FrictionLaw, PreslidingCoulomb, SmoothCoulomb
+from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
+from sea_ident.simulation.result import Simulation
+from sea_ident.simulation.sensors import SensorNoise, WarmUp, motor_current
+from sea_ident.simulation.simulate import Settling, simulate
+
+__all__ = [
+    "ComputedTorque",
+    "Controller",
+    "FrictionJitter",
+    "FrictionLaw",
+    "Plant",
+    "PlantedEffect",
+    "PreslidingCoulomb",
+    "SensorNoise",
+    "Settling",
+    "Simulation",
+    "SmoothCoulomb",
+    "VelocityController",
+    "WarmUp",
+    "motor_current",
+    "plant_from_robot",
+    "simulate",
+]

@@ -1,0 +1,131 @@
+"""Controllers: what drives the motors along a reference.
+
+A controller is reduced to a torque that depends on time alone and two gains per motor, so that every step of the
+integrator sees it implicitly: tau_motor = bias(t) - position_gain theta - velocity_gain theta'.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import SimulationError
+from sea_ident.motion import Motion
+from sea_ident.regressor import inverse_dynamics
+from sea_ident.robot import Robot
+from sea_ident.simulation.plant import Plant
+from sea_ident.simulation.reference import Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Torque of the motors as a function of time and motor state.
+
+    Attributes:
+        bias: (N, n) torque at theta = theta' = 0 [N m].
+        position_gain: (n,) [N m/rad].
+        velocity_gain: (n,) [N m s/rad].
+        reference: (N, n) motion that the motors are meant to follow (theta), and the links with rigid joints (q).
+    """
+
+    bias: FloatArray
+    position_gain: FloatArray
+    velocity_gain: FloatArray
+    reference: Motion
+
+
+class Controller(ABC):
+    """How the motors are driven."""
+
+    @abstractmethod
+    def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
+        """The drive at the times (N,) [s]; `robot` is what the controller knows, not the plant."""
+
+
+def _gained(reference: Motion, feedforward: FloatArray, position_gain: FloatArray, velocity_gain: FloatArray) -> Drive:
+    bias = feedforward + reference.theta * position_gain + reference.dtheta * velocity_gain
+    return Drive(bias, position_gain, velocity_gain, reference)
+
+
+def reference_inertia(robot: Robot, q: FloatArray) -> FloatArray:
+    """(n,) mean inertia that each motor moves with all springs stiff, over configurations (N, n) [kg m2]."""
+    total = np.zeros(robot.n)
+    chosen = q[:: max(1, len(q) // 50)]
+    for sample in chosen:
+        h, s, b = robot.mass_matrices(sample)
+        total += np.diag(h + s + s.T + b)
+    return total / len(chosen)
+
+
+@dataclass(frozen=True)
+class VelocityController(Controller):
+    """Velocity loop with position correction and feed-forward, on the motor side (paper, section III.C).
+
+    tau_m = f tau_model(reference) + J w_v ((theta_r' - theta') + w_p (theta_r - theta)), J being the inertia that the
+    motor moves. The reference is applied to the motors, as in the paper: the springs then take the links elsewhere.
+
+    Attributes:
+        bandwidth: w_v of the velocity loop [rad/s].
+        correction: w_p of the position correction [rad/s].
+        feedforward: f, share of the torque of the robot's own URDF model (bodies, rotors, viscous friction) [-].
+    """
+
+    bandwidth: float = 60.0
+    correction: float = 15.0
+    feedforward: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.bandwidth > 0.0 and self.correction >= 0.0 and self.feedforward >= 0.0):
+            raise SimulationError(
+                f"velocity controller: bandwidth {self.bandwidth} must be positive, correction {self.correction} and "
+                f"feedforward {self.feedforward} not negative"
+            )
+
+    def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
+        """The drive at the times (N,) [s]."""
+        motion = reference.motion(time)
+        velocity_gain = reference_inertia(robot, motion.q) * self.bandwidth
+        torque = np.zeros_like(motion.q)
+        if self.feedforward > 0.0:
+            link, motor = inverse_dynamics(robot, motion)
+            torque = self.feedforward * (link + motor + motion.dtheta * _known_viscous_friction(robot))
+        return _gained(motion, torque, velocity_gain * self.correction, velocity_gain)
+
+
+def _known_viscous_friction(robot: Robot) -> FloatArray:
+    values = [
+        (joint.damping or 0.0) + ((joint.actuator.viscous_friction or 0.0) if joint.actuator is not None else 0.0)
+        for joint in robot.joints
+    ]
+    return np.array(values)
+
+
+@dataclass(frozen=True, eq=False)
+class ComputedTorque(Controller):
+    """The reference applied to the links: motor motion and torque come from the elastic inverse dynamics of a model.
+
+    The spring torque that the link rows need gives the deflection, and so the motor motion; the motor rows then give
+    the torque. A motor-side loop corrects what the model does not know.
+
+    Attributes:
+        model: the model that the controller uses; None takes the robot's own description.
+        bandwidth: of the velocity loop around it [rad/s].
+        correction: of the position correction around it [rad/s].
+        smoothing: v_off of the model's Coulomb friction [rad/s].
+    """
+
+    model: Plant | None = None
+    bandwidth: float = 60.0
+    correction: float = 15.0
+    smoothing: float = 0.02
+
+    def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
+        """The drive at the times (N,) [s]."""
+        from sea_ident.simulation.elastic_inverse import elastic_inverse
+        from sea_ident.simulation.plant import plant_from_robot
+
+        model = plant_from_robot(robot) if self.model is None else self.model
+        motion, torque = elastic_inverse(model, reference, time, self.smoothing)
+        velocity_gain = reference_inertia(model.robot, motion.q) * self.bandwidth
+        return _gained(motion, torque, velocity_gain * self.correction, velocity_gain)

@@ -1,0 +1,228 @@
+"""The closed loop as one system M(u) u'' = F(t, u, u') and its step."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg.lapack import dposv, dpotrf, dpotrs
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import SimulationError
+from sea_ident.simulation.controller import Drive
+from sea_ident.simulation.friction import JointFriction
+from sea_ident.simulation.plant import Plant
+from sea_ident.simulation.planted import PlantedTorques
+from sea_ident.simulation.rosenbrock import RosenbrockW
+
+
+class ClosedLoop:
+    """Robot, springs, friction and drive, in the coordinates u = (q, theta of the elastic joints).
+
+    Everything inside a step is done with scalars and preallocated arrays: at a dozen coordinates the overhead of a
+    call outweighs the arithmetic.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        drive: Drive,
+        motor_friction: Sequence[JointFriction],
+        link_friction: Sequence[JointFriction | None],
+        planted: PlantedTorques | None,
+        method: RosenbrockW,
+        step: float,
+    ) -> None:
+        robot = plant.robot
+        self.plant, self.step_size, self.planted = plant, step, planted
+        self.n = n = robot.n
+        self.elastic = [int(i) for i in robot.elastic_indices]
+        self.motor = list(range(n))  # coordinate of each motor
+        for k, i in enumerate(self.elastic):
+            self.motor[i] = n + k
+        self.size = size = n + len(self.elastic)
+        self.map = np.zeros((robot.extended_model.nv, size))
+        self.map[:, :n] = robot.link_map
+        for i in range(n):
+            self.map[:, self.motor[i]] += robot.motor_map[:, i]
+        self.map = np.asfortranarray(self.map)
+        self._map_t = np.ascontiguousarray(self.map.T)
+        self._offset = robot.offset
+        self._model = robot.extended_model
+        self._data = robot.extended_model.createData()
+        self._added_inertia = None if planted is None else planted.added_inertia(self.n, self.motor, size)
+
+        self.link_friction = list(link_friction)
+        kp, kd = drive.position_gain.tolist(), drive.velocity_gain.tolist()
+        k1, k3, d = plant.stiffness.tolist(), plant.cubic_stiffness.tolist(), plant.spring_damping.tolist()
+        self._numbers = list(zip(range(n), self.motor, kp, kd, k1, k3, d, strict=True))
+        self.replace_motor_friction(motor_friction)
+        self._constant_stiffness = np.zeros((size, size))
+        self._constant_damping = np.zeros((size, size))
+        for i in range(n):
+            m = self.motor[i]
+            self._constant_stiffness[m, m] += kp[i]
+            self._constant_damping[m, m] += kd[i]
+            if m != i:
+                self._constant_damping[np.ix_([i, m], [i, m])] += d[i] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        stages = len(method.weights)
+        self._stages = stages
+        self._hgamma = step * method.gamma
+        # One product gives the stage value and the coupling of the right-hand side.
+        self._combine = [
+            np.ascontiguousarray(np.stack([method.stage[i, :i], method.coupling[i, :i] / step])) for i in range(stages)
+        ]
+        self._weights = method.weights
+        self._nodes = [float(node) * step for node in method.nodes]
+        self._increments = np.zeros((stages, 2 * size))
+        self.acceleration = np.zeros(size)
+        self.tau_motor = [0.0] * n
+        self.tau_spring = [0.0] * n
+
+    def replace_motor_friction(self, motor_friction: Sequence[JointFriction]) -> None:
+        """Go on with another friction of the motors."""
+        self.motor_friction = list(motor_friction)
+        sides = zip(self._numbers, self.motor_friction, self.link_friction, strict=True)
+        self._joints, self._slopes = [], []
+        for (i, m, kp, kd, k1, k3, d), on_motor, on_link in sides:
+            link_torque, link_slope = (None, None) if on_link is None else (on_link.torque, on_link.slope)
+            self._joints.append((i, m, kp, kd, k1, k3, d, on_motor.torque, link_torque))
+            self._slopes.append((i, m, k1, k3, on_motor.slope, link_slope))
+
+    # -- forces ------------------------------------------------------------------------------------------------------
+
+    def forces(self, time: float, elapsed: float, bias: list[float], u: list[float], w: list[float]) -> list[float]:
+        """Generalised forces of drive, springs, friction and planted effects [N m]; keeps the torques of the drive."""
+        out = [0.0] * self.size
+        tau_motor, tau_spring = self.tau_motor, self.tau_spring
+        for i, m, kp, kd, k1, k3, d, motor_friction, link_friction in self._joints:
+            theta, dtheta = u[m], w[m]
+            torque = bias[i] - kp * theta - kd * dtheta
+            tau_motor[i] = torque
+            torque -= motor_friction(theta, dtheta)
+            if m != i:
+                q, dq = u[i], w[i]
+                deflection = theta - q
+                spring = deflection * (k1 + k3 * deflection * deflection) + d * (dtheta - dq)
+                tau_spring[i] = spring
+                out[m] = torque - spring
+                out[i] = spring if link_friction is None else spring - link_friction(q, dq)
+            else:
+                out[i] = torque
+        if self.planted is not None:
+            self.planted.add(time, elapsed, u, w, tau_motor, tau_spring, out)
+        return out
+
+    def mass(self, u: FloatArray) -> FloatArray:
+        """(size, size) mass matrix."""
+        mass = self._map_t @ pin.crba(self._model, self._data, self.map @ u + self._offset) @ self.map
+        return mass if self._added_inertia is None else mass + self._added_inertia
+
+    def bias_forces(self, u: FloatArray, w: FloatArray) -> FloatArray:
+        """(size,) Coriolis, centrifugal and gravity forces."""
+        x = self.map @ u + self._offset
+        torque: FloatArray = self._map_t @ pin.nonLinearEffects(self._model, self._data, x, self.map @ w)
+        return torque
+
+    def evaluate(self, time: float, bias: list[float], y: FloatArray) -> None:
+        """Torques and `acceleration` at a state (2 size,) that was reached by accepted steps."""
+        u, w = y[: self.size], y[self.size :]
+        force = np.array(self.forces(time, 0.0, bias, u.tolist(), w.tolist())) - self.bias_forces(u, w)
+        _, self.acceleration, info = dposv(self.mass(u), force)
+        if info != 0:
+            raise SimulationError(self._not_positive(u))
+
+    def accept(self, time: float, y: FloatArray) -> None:
+        """Tell everything that has memory where the step ended."""
+        values = y.tolist()
+        size = self.size
+        for i, friction in enumerate(self.motor_friction):
+            m = self.motor[i]
+            friction.accept(values[m], values[size + m])
+        for i in self.elastic:
+            link_friction = self.link_friction[i]
+            if link_friction is not None:
+                link_friction.accept(values[i], values[size + i])
+        if self.planted is not None:
+            self.planted.accept(time, values[:size], values[size:])
+
+    # -- one step ----------------------------------------------------------------------------------------------------
+
+    def step(self, time: float, biases: list[list[float]], y: FloatArray) -> FloatArray:
+        """The state (2 size,) one step later.
+
+        Args:
+            time: [s].
+            biases: torque of the drive at zero state, at each stage.
+            y: (2 size,) positions and velocities.
+        """
+        size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
+        mass = stiffness = factor = None
+        for i in range(self._stages):
+            if i == 0:
+                stage = y
+            else:
+                both = self._combine[i].dot(increments[:i])
+                stage = y + both[0]
+            u, w = stage[:size], stage[size:]
+            u_list, w_list = u.tolist(), w.tolist()
+            x = self.map.dot(u) + self._offset
+            force = np.array(self.forces(time + elapsed[i], elapsed[i], biases[i], u_list, w_list))
+            force -= self._map_t.dot(pin.nonLinearEffects(self._model, self._data, x, self.map.dot(w)))
+            stage_mass = self._map_t.dot(pin.crba(self._model, self._data, x)).dot(self.map)
+            if self._added_inertia is not None:
+                stage_mass += self._added_inertia
+            if i == 0:
+                mass = stage_mass
+                stiffness, damping = self._jacobian(time, biases[0], u_list, w_list)
+                rate = w
+                rhs = force - (hgamma * stiffness).dot(w)
+                factor, info = dpotrf(mass / hgamma + damping + hgamma * stiffness)
+                if info != 0:
+                    raise SimulationError(self._not_positive(u))
+            else:
+                _, acceleration, info = dposv(stage_mass, force)
+                if info != 0:
+                    raise SimulationError(self._not_positive(u))
+                coupling = both[1]
+                rate = w + coupling[:size]
+                rhs = mass.dot(acceleration + coupling[size:]) - (hgamma * stiffness).dot(rate)
+            change, _ = dpotrs(factor, rhs)
+            row = increments[i]
+            row[size:] = change
+            row[:size] = hgamma * (rate + change)
+        return y + self._weights.dot(increments)
+
+    def _jacobian(
+        self, time: float, bias: list[float], u: list[float], w: list[float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Symmetric stiffness and damping of the forces: an approximation is enough for the method's order."""
+        stiffness, damping = self._constant_stiffness.copy(), self._constant_damping.copy()
+        for i, m, k1, k3, motor_slope, link_slope in self._slopes:
+            damping[m, m] += motor_slope(w[m])
+            if m != i:
+                deflection = u[m] - u[i]
+                k = k1 + 3.0 * k3 * deflection * deflection
+                stiffness[i, i] += k
+                stiffness[m, m] += k
+                stiffness[i, m] -= k
+                stiffness[m, i] -= k
+                if link_slope is not None:
+                    damping[i, i] += link_slope(w[i])
+        if self.planted is not None:
+            self.planted.add_damping(time, u, w, self.tau_motor, self.tau_spring, damping)
+        return stiffness, damping
+
+    def _not_positive(self, u: FloatArray) -> str:
+        robot = self.plant.robot
+        if not np.all(np.isfinite(u)):
+            k = int(np.flatnonzero(~np.isfinite(u))[0])
+            i = k if k < self.n else self.elastic[k - self.n]
+            return f"the position of joint {robot.joint_names[i]!r} is not finite"
+        diagonal = np.diag(self.mass(u))
+        k = int(np.argmin(diagonal))
+        i = k if k < self.n else self.elastic[k - self.n]
+        side = "link" if k < self.n else "motor"
+        return (
+            f"the mass matrix is not positive at q = {np.round(u[: self.n], 4).tolist()}: the {side} of joint "
+            f"{robot.joint_names[i]!r} has the inertia {diagonal[k]:.4g} kg m2; check masses and rotor inertias"
+        )

@@ -1,0 +1,189 @@
+"""The numbers that a simulation needs: bodies, rotors, springs, friction, drives."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects import Effect
+from sea_ident.exceptions import SimulationError
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class PlantedEffect:
+    """A further effect that acts in a simulation.
+
+    Attributes:
+        effect: where and how it acts.
+        values: (k,) values of its parameters, in the order of its columns.
+    """
+
+    effect: Effect
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A robot with all its numbers known.
+
+    Attributes:
+        robot: the robot, with the inertial parameters of its links and rotors.
+        viscous_friction: (n,) at the motors (rigid joint: at the joint) [N m s/rad].
+        coulomb_friction: (n,) at the motors [N m].
+        link_viscous_friction: (n,) at the links of elastic joints [N m s/rad].
+        link_coulomb_friction: (n,) at the links of elastic joints [N m].
+        stiffness: (n,) K1, 0 at a rigid joint [N m/rad].
+        cubic_stiffness: (n,) K3 [N m/rad3].
+        spring_damping: (n,) D [N m s/rad].
+        efficiency: (n,) of the transmissions, 1 where there is none [-].
+        torque_constant: (n,) at the motor shaft, NaN where not known [N m/A].
+        notes: what was taken as absent.
+    """
+
+    robot: Robot
+    viscous_friction: FloatArray
+    coulomb_friction: FloatArray
+    link_viscous_friction: FloatArray
+    link_coulomb_friction: FloatArray
+    stiffness: FloatArray
+    cubic_stiffness: FloatArray
+    spring_damping: FloatArray
+    efficiency: FloatArray
+    torque_constant: FloatArray
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self._numbers():
+            values = np.asarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, values)
+            if values.shape != (self.robot.n,):
+                raise SimulationError(f"plant of {self.robot.name}: {name} is {values.shape}, not ({self.robot.n},)")
+            if name == "torque_constant":
+                continue
+            bad = np.flatnonzero(~np.isfinite(values))
+            if bad.size:
+                raise SimulationError(f"joint {self.robot.joint_names[bad[0]]!r}: {name} is {values[bad[0]]}")
+        for i, joint in enumerate(self.robot.joints):
+            if joint.elastic and not self.stiffness[i] > 0.0:
+                raise SimulationError(
+                    f"joint {joint.name!r}: the stiffness of its spring is {self.stiffness[i]:g} N m/rad; "
+                    "it must be positive"
+                )
+            if not 0.0 < self.efficiency[i] <= 1.0:
+                raise SimulationError(f"joint {joint.name!r}: efficiency {self.efficiency[i]:g} is not in (0, 1]")
+
+    @staticmethod
+    def _numbers() -> tuple[str, ...]:
+        return (
+            "viscous_friction", "coulomb_friction", "link_viscous_friction", "link_coulomb_friction", "stiffness",
+            "cubic_stiffness", "spring_damping", "efficiency", "torque_constant",
+        )  # fmt: skip
+
+    def replace(self, **changes: FloatArray | Robot) -> "Plant":
+        """A copy with some fields replaced, as `dataclasses.replace`."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def values_of(self, effects: Sequence[Effect]) -> FloatArray:
+        """True parameters of a model whose effects the plant holds.
+
+        Args:
+            effects: rigid bodies, rotors, friction and springs, in any order.
+
+        Returns:
+            (p,) values in the order of the model's columns.
+
+        Raises:
+            SimulationError: for an effect that is not one of the plant's own.
+        """
+        robot = self.robot
+        parts: list[FloatArray] = []
+        for effect in effects:
+            i = 0 if effect.joint is None else robot.index(effect.joint)
+            match effect.name:
+                case "rigid_bodies" | "rotor_inertia":
+                    parts.append(effect.prior(robot))
+                case "viscous_friction":
+                    parts.append(self.viscous_friction[i : i + 1])
+                case "coulomb_friction":
+                    parts.append(self.coulomb_friction[i : i + 1])
+                case "link_friction":
+                    parts.append(np.array([self.link_viscous_friction[i], self.link_coulomb_friction[i]]))
+                case "spring_stiffness":
+                    parts.append(self.stiffness[i : i + 1])
+                case "spring_stiffening":
+                    parts.append(self.cubic_stiffness[i : i + 1])
+                case "spring_damping":
+                    parts.append(self.spring_damping[i : i + 1])
+                case other:
+                    raise SimulationError(f"the plant of {robot.name} has no numbers for the effect {other!r}")
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def summary(self) -> str:
+        """A table of the numbers per joint."""
+        lines = [f"plant of {self.robot.name}"]
+        for i, joint in enumerate(self.robot.joints):
+            spring = (
+                f", spring {self.stiffness[i]:g} {self.cubic_stiffness[i]:g} {self.spring_damping[i]:g}"
+                if joint.elastic
+                else ""
+            )
+            lines.append(
+                f"  {joint.name}: friction {self.viscous_friction[i]:g} {self.coulomb_friction[i]:g}, link friction "
+                f"{self.link_viscous_friction[i]:g} {self.link_coulomb_friction[i]:g}{spring}, "
+                f"efficiency {self.efficiency[i]:g}"
+            )
+        lines.extend(f"  note: {text}" for text in self.notes)
+        return "\n".join(lines)
+
+
+def plant_from_robot(robot: Robot) -> Plant:
+    """The plant that the URDF and the annotation describe.
+
+    What a motor or spring needs and the annotation leaves out is an error. A spring without `cubicStiffness` is
+    linear, a transmission without `efficiency` loses nothing, a joint without `<dynamics>` has no link friction (the
+    URDF's own default), and a joint without motor has no friction of a motor.
+
+    Raises:
+        SimulationError: a number is missing; the message names the joint and the element.
+    """
+    n, missing, notes = robot.n, [], []
+    numbers = {name: np.zeros(n) for name in Plant._numbers()}
+    numbers["efficiency"][:] = 1.0
+    numbers["torque_constant"][:] = np.nan
+    for i, joint in enumerate(robot.joints):
+        actuator = joint.actuator
+        on_link = "link_" if joint.elastic else ""
+        numbers[f"{on_link}viscous_friction"][i] += joint.damping or 0.0
+        numbers[f"{on_link}coulomb_friction"][i] += joint.friction or 0.0
+        if actuator is None:
+            continue
+        wanted = {
+            "rotorInertia": actuator.rotor_inertia,
+            "viscousFriction": actuator.viscous_friction,
+            "coulombFriction": actuator.coulomb_friction,
+        }
+        if joint.elastic:
+            spring = robot.spring(joint.name)
+            wanted |= {"stiffness": spring.stiffness, "damping": spring.damping}
+            numbers["stiffness"][i] = spring.stiffness or 0.0
+            numbers["spring_damping"][i] = spring.damping or 0.0
+            numbers["cubic_stiffness"][i] = spring.cubic_stiffness or 0.0
+            if spring.cubic_stiffness is None:
+                notes.append(f"joint {joint.name!r}: no cubicStiffness, its spring is linear")
+        missing += [f"{joint.name}: {tag}" for tag, value in wanted.items() if value is None]
+        numbers["viscous_friction"][i] += actuator.viscous_friction or 0.0
+        numbers["coulomb_friction"][i] += actuator.coulomb_friction or 0.0
+        if actuator.efficiency is None:
+            notes.append(f"joint {joint.name!r}: no efficiency, its transmission loses nothing")
+        else:
+            numbers["efficiency"][i] = actuator.efficiency
+        if actuator.torque_constant is not None:
+            numbers["torque_constant"][i] = actuator.torque_constant
+    if missing:
+        raise SimulationError(
+            f"{robot.source}: a simulation needs numbers that the annotation leaves out: {'; '.join(missing)}. "
+            "Add them to the <transmission>, or give simulate(plant=...) "
+        )
+    return Plant(robot, notes=tuple(notes), **numbers)
