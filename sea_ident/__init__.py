@@ -7,6 +7,9 @@ __version__ = "0.1.0"
 
 # Names are imported when first used, so that `sea-ident --help` answers at once.
 _HOME = {
+    "Excitation": "excitation",
+    "design_excitation": "excitation",
+    "read_excitation": "excitation",
     "load_robot": "robot",
     "Robot": "robot",
     "Motion": "motion",
@@ -20,6 +23,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Excitation",
     "FourierSeries",
     "Motion",
     "Robot",
@@ -27,14 +31,17 @@ __all__ = [
     "SeaIdentWarning",
     "Simulation",
     "build_regressor",
+    "design_excitation",
     "find_base_parameters",
     "load_robot",
+    "read_excitation",
     "simulate",
 ]
 
 if TYPE_CHECKING:
     from sea_ident.base_parameters import find_base_parameters
     from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+    from sea_ident.excitation import Excitation, design_excitation, read_excitation
     from sea_ident.motion import FourierSeries, Motion
     from sea_ident.regressor import build_regressor
     from sea_ident.robot import Robot, load_robot

@@ -1,0 +1,18 @@
+"""Exciting trajectories: the motion that tells most about the parameters, inside every limit at every instant."""
+
+from sea_ident.excitation.criteria import AOptimality, ConditionNumber, Criterion, DOptimality, EOptimality
+from sea_ident.excitation.design import Progress, design_excitation, reduced_effects
+from sea_ident.excitation.result import Excitation, read_excitation
+
+__all__ = [
+    "AOptimality",
+    "ConditionNumber",
+    "Criterion",
+    "DOptimality",
+    "EOptimality",
+    "Excitation",
+    "Progress",
+    "design_excitation",
+    "read_excitation",
+    "reduced_effects",
+]
