@@ -18,6 +18,14 @@ _HOME = {
     "find_base_parameters": "base_parameters",
     "simulate": "simulation",
     "Simulation": "simulation",
+    "ProcessedRecording": "processing",
+    "process": "processing",
+    "Model": "estimation",
+    "identify": "estimation",
+    "identify_springs": "estimation",
+    "read_model": "estimation",
+    "Validation": "validation",
+    "validate": "validation",
     "SeaIdentError": "exceptions",
     "SeaIdentWarning": "exceptions",
 }
@@ -25,27 +33,38 @@ _HOME = {
 __all__ = [
     "Excitation",
     "FourierSeries",
+    "Model",
     "Motion",
+    "ProcessedRecording",
     "Robot",
     "SeaIdentError",
     "SeaIdentWarning",
     "Simulation",
+    "Validation",
     "build_regressor",
     "design_excitation",
     "find_base_parameters",
+    "identify",
+    "identify_springs",
     "load_robot",
+    "process",
     "read_excitation",
+    "read_model",
     "simulate",
+    "validate",
 ]
 
 if TYPE_CHECKING:
     from sea_ident.base_parameters import find_base_parameters
+    from sea_ident.estimation import Model, identify, identify_springs, read_model
     from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
     from sea_ident.excitation import Excitation, design_excitation, read_excitation
     from sea_ident.motion import FourierSeries, Motion
+    from sea_ident.processing import ProcessedRecording, process
     from sea_ident.regressor import build_regressor
     from sea_ident.robot import Robot, load_robot
     from sea_ident.simulation import Simulation, simulate
+    from sea_ident.validation import Validation, validate
 
 
 def __getattr__(name: str) -> Any:

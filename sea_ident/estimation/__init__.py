@@ -1,0 +1,30 @@
+"""Estimation: base parameters, springs, and how sure both are."""
+
+from sea_ident.estimation.estimators import Estimate, Estimator, JointWLS, LeastSquares, PerSampleWLS
+from sea_ident.estimation.identify import identify
+from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
+from sea_ident.estimation.model_file import model_from_dict, read_model
+from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.springs import SpringResult, Verdict, identify_springs
+from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
+
+__all__ = [
+    "CovarianceKind",
+    "Estimate",
+    "Estimator",
+    "Excerpt",
+    "Fit",
+    "JointWLS",
+    "LeastSquares",
+    "Model",
+    "Observations",
+    "Parameter",
+    "PerSampleWLS",
+    "SpringResult",
+    "Uncertainty",
+    "Verdict",
+    "identify",
+    "identify_springs",
+    "model_from_dict",
+    "read_model",
+]

@@ -1,0 +1,258 @@
+"""`identify`: from a recording to a model."""
+
+import warnings as python_warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+
+from sea_ident._typing import FloatArray
+from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
+from sea_ident.effects import Effect, base_effects
+from sea_ident.effects.base import Side
+from sea_ident.estimation.estimators import Estimate, Estimator, PerSampleWLS
+from sea_ident.estimation.model import Excerpt, Fit, Model
+from sea_ident.estimation.observations import Observations, base_rows
+from sea_ident.estimation.solve import condition_number, solve_weighted
+from sea_ident.estimation.springs import identify_springs, spring_rows
+from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
+from sea_ident.exceptions import IdentificationError, SeaIdentWarning
+from sea_ident.motion import Motion
+from sea_ident.processing import ProcessedRecording, process
+from sea_ident.recordings import Recording
+from sea_ident.regressor import regressor_chunks
+from sea_ident.robot import Robot
+
+VISIBLE = 1e-7
+"""Singular values of the column-normalised regressor below this share of the largest tell nothing."""
+
+EXCERPT = 500
+"""Samples of the mean period that a model keeps."""
+
+
+def identify(
+    robot: Robot,
+    recording: Recording | ProcessedRecording,
+    *,
+    effects: Sequence[Effect] | None = None,
+    estimator: Estimator | None = None,
+    period: float | None = None,
+    link_harmonics: int | None = None,
+    motor_harmonics: int | None = None,
+    unknown_zero: Sequence[str] = (),
+) -> Model:
+    """Identify the dynamic model of a robot, then its springs (paper, II.B and II.E).
+
+    Args:
+        robot: the robot.
+        recording: what was measured, as it was read or already processed.
+        effects: the model; bodies, rotors, viscous and Coulomb friction of every motor where None. Springs are
+            identified in the second step and are not to be given here.
+        estimator: how; the paper's weighting per sample, smoothed, where None.
+        period: [s], of a recording that is not processed yet; found from the data where None.
+        link_harmonics: harmonics of q; chosen from the data where None.
+        motor_harmonics: harmonics of theta; chosen from the data where None.
+        unknown_zero: joints whose encoders of theta and q have different, unknown zeros.
+
+    Returns:
+        The model. Its standard deviations are those that the spread between periods shows.
+
+    Raises:
+        RecordingError: the recording lacks what is needed.
+        IdentificationError: the data do not determine the model, or contradict its physics in every joint.
+    """
+    if isinstance(recording, ProcessedRecording):
+        processed = recording
+    else:
+        processed = process(
+            recording, robot, period=period, link_harmonics=link_harmonics, motor_harmonics=motor_harmonics
+        )
+    if processed.joint_names != robot.joint_names:
+        raise IdentificationError(
+            f"{processed.source} was processed for the joints {', '.join(processed.joint_names)}; {robot.name} has "
+            f"{', '.join(robot.joint_names)}"
+        )
+    chosen = tuple(base_effects(robot) if effects is None else effects)
+    _refuse_springs(robot, chosen)
+    how = PerSampleWLS() if estimator is None else estimator
+    found: list[str] = list(processed.warnings)
+    first = len(found)
+    base, lost = visible_parameters(robot, chosen, processed)
+    found.extend(lost)
+    observations = Observations(robot, chosen, base, processed)
+    estimate = how.estimate(observations)
+    uncertainty = honest_uncertainty(observations, estimate)
+    found.extend([*estimate.warnings, *uncertainty.warnings])
+    found.extend(_check_signs(observations))
+    model = _model(observations, estimate, uncertainty, how.name)
+    if robot.elastic_indices.size:
+        springs = identify_springs(model, processed, unknown_zero=unknown_zero)
+        found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict == "circular")
+        model = replace(model, springs=springs)
+    for text in found[first:]:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+    return replace(model, warnings=tuple(dict.fromkeys(found)), notes=(*processed.notes, *estimate.notes))
+
+
+def visible_parameters(
+    robot: Robot, effects: tuple[Effect, ...], processed: ProcessedRecording
+) -> tuple[BaseParameters, tuple[str, ...]]:
+    """Base parameters of the robot, or of what this motion shows of it.
+
+    Args:
+        robot: the robot.
+        effects: the model.
+        processed: the recording.
+
+    Returns:
+        The base parameters, and a warning that names what this motion cannot tell apart.
+
+    Raises:
+        IdentificationError: the motion shows nothing.
+    """
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        base = find_base_parameters(robot, effects)
+    motion = _thinned(processed.motion, 600)
+    triangle = np.zeros((0, len(base.columns)))
+    for part in regressor_chunks(robot, effects, motion):
+        rows = part.sum.reshape(-1, len(base.columns))
+        triangle = np.asarray(scipy.linalg.qr(np.vstack([triangle, rows]), mode="r")[0][: len(base.columns)])
+    own = triangle[:, base.independent]
+    norms = np.linalg.norm(own, axis=0)
+    strength = np.linalg.svd(own / np.where(norms > 0.0, norms, 1.0), compute_uv=False)
+    if norms.min() > 0.0 and strength[-1] > VISIBLE * strength[0]:
+        return base, base.warnings
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        less = group_columns(base.columns, triangle, VISIBLE)
+    kept = set(less.independent.tolist())
+    missing = [base.columns[k].name for k in base.independent if int(k) not in kept]
+    return less, (
+        f"{processed.source}: this motion tells {less.rank} of {base.rank} base parameters; not told, or told only in "
+        f"sum with others: {', '.join(missing)}. Excite all joints",
+    )
+
+
+def _thinned(motion: Motion, samples: int) -> Motion:
+    return motion[:: max(1, len(motion) // samples)]
+
+
+def _refuse_springs(robot: Robot, effects: tuple[Effect, ...]) -> None:
+    for effect in effects:
+        if effect.side is Side.SPRING:
+            raise IdentificationError(
+                f"the effect {effect.name!r} acts in a spring, which the motor torque does not show (it cancels in the "
+                "sum of link and motor rows); springs are identified in the second step: leave it out"
+            )
+
+
+def _check_signs(observations: Observations) -> list[str]:
+    """Warn of joints whose inertia comes out negative.
+
+    Raises:
+        IdentificationError: it does in every joint: the sign of the torque is wrong.
+    """
+    robot, source = observations.robot, observations.processed.source
+    inertia, std = joint_inertias(observations)
+    negative = inertia < -5.0 * std
+    names = [name for name, bad in zip(robot.joint_names, negative, strict=True) if bad]
+    if names and len(names) == robot.n:
+        raise IdentificationError(
+            f"{source}: the inertia comes out negative in every joint "
+            f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
+            "current has the wrong sign; exchange it (ColumnSource sign=-1)"
+        )
+    return [
+        f"{source}: the inertia that joint {name!r} moves comes out negative from its own torque: has that torque or "
+        "current the wrong sign?"
+        for name in names
+    ]
+
+
+def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
+    """Torque per acceleration of every joint, each found from the torque of that joint alone.
+
+    Link and motor move together, so this is the diagonal of H + S + S' + B at the mean position of the recording.
+
+    Returns:
+        (n,) inertias [kg m2] or [kg] and (n,) standard deviations.
+    """
+    robot = observations.robot
+    n = robot.n
+    middle = observations.processed.motion.q.mean(axis=0)
+    still = np.zeros((n + 1, n))
+    push = np.vstack([np.eye(n), np.zeros((1, n))])
+    motion = Motion.rigid(np.arange(n + 1.0), still + middle, still, push)
+    rows = base_rows(robot, observations.effects, observations.base, motion)
+    inertia, std = np.zeros(n), np.full(n, np.inf)
+    for i in range(n):
+        own = observations.rows[:, i]
+        norms = np.linalg.norm(own, axis=0)
+        seen = norms > 0.0
+        if not np.any(seen):
+            continue
+        scaled = own[:, seen] / norms[seen]
+        inverse = np.linalg.pinv(scaled, rcond=1e-6)
+        response = (rows[i, i] - rows[n, i])[seen] / norms[seen]
+        if np.linalg.norm(response - response @ inverse @ scaled) > 1e-3 * np.linalg.norm(response):
+            continue  # this joint's torque alone does not tell its inertia
+        values = inverse @ observations.torque[:, i]
+        spread = float(np.std(observations.torque[:, i] - scaled @ values))
+        inertia[i] = response @ values
+        std[i] = spread * float(np.linalg.norm(response @ inverse))
+    return inertia, std
+
+
+def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertainty, name: str) -> Model:
+    processed, rows = observations.processed, observations.rows
+    residual = observations.residual(estimate.values)
+    plain = solve_weighted(rows, observations.torque)
+    fit = Fit(
+        rms_residual=np.sqrt(np.mean(residual**2, axis=0)),
+        noise_std=np.sqrt(processed.raw_tau_variance.mean(axis=0) / processed.periods),
+        rms_torque=np.sqrt(np.mean(observations.torque**2, axis=0)),
+        condition_number=condition_number(plain.triangle),
+        log_det=plain.log_det,
+        log_det_weighted=estimate.log_det_weighted,
+        samples=processed.samples,
+        periods=processed.periods,
+        period=processed.period,
+    )
+    weighted = rows * estimate.weights[:, :, None]
+    count = rows.shape[-1]
+    information = rows.reshape(-1, count).T @ weighted.reshape(-1, count)
+    model = Model(
+        robot=observations.robot,
+        effects=observations.effects,
+        base=observations.base,
+        values=estimate.values,
+        model_covariance=estimate.covariance,
+        uncertainty=uncertainty,
+        information=0.5 * (information + information.T),
+        estimator=name,
+        springs=(),
+        fit=fit,
+        excerpt=_no_excerpt(observations.robot.n),
+        recording=processed.source,
+    )
+    thin = slice(None, None, max(1, -(-processed.samples // EXCERPT)))
+    motion = processed.motion[thin]
+    spring = np.zeros((len(motion), 0))
+    if observations.robot.elastic_indices.size:
+        part = spring_rows(model, motion, processed.tau_motor[thin])
+        spring = part.offset + part.rows @ estimate.values
+    excerpt = Excerpt(
+        motion=motion,
+        tau_motor=processed.tau_motor[thin],
+        tau_std=np.sqrt(processed.raw_tau_variance[thin]),
+        tau_model=processed.tau_motor[thin] - residual[thin],
+        tau_spring=spring,
+    )
+    return replace(model, excerpt=excerpt)
+
+
+def _no_excerpt(n: int) -> Excerpt:
+    empty = np.zeros((0, n))
+    return Excerpt(Motion.rigid(np.zeros(0), empty, empty, empty), empty, empty, empty, empty)

@@ -1,0 +1,419 @@
+"""Second step: the springs, from the spring torque that the identified dynamic model gives (paper, eqs. 21-23)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+
+from sea_ident._typing import FloatArray
+from sea_ident.estimation.uncertainty import student_factor
+from sea_ident.exceptions import IdentificationError
+from sea_ident.motion import Motion
+from sea_ident.processing import ProcessedRecording
+from sea_ident.regressor import build_regressor
+
+if TYPE_CHECKING:
+    from sea_ident.estimation.model import Model
+
+FOLDS = 10
+"""Pieces of the period of which each is predicted from the others."""
+
+EXCITED = 0.25
+"""Relative standard deviation of the stiffness beyond which a spring counts as not excited."""
+
+SUPPORT = 1e-3
+"""Significance that a term beyond the linear spring needs."""
+
+
+class Verdict(StrEnum):
+    """What the data say about the law of a spring."""
+
+    LINEAR = "linear"
+    STIFFENING = "stiffening"
+    HYSTERETIC = "hysteretic"
+    NOT_EXCITED = "not_excited"
+    CIRCULAR = "circular"
+
+
+@dataclass(frozen=True)
+class SpringResult:
+    """Spring of one joint: ``tau = K1 d + K3 d^3 + D d'`` with d = theta - q (paper, eq. 21).
+
+    Values and standard deviations are those of the full law whatever the verdict, so that the intervals mean what they
+    say; `law` gives the values that the data support.
+
+    Attributes:
+        joint: its joint.
+        stiffness: K1 [N m/rad].
+        stiffness_std: [N m/rad].
+        cubic_stiffness: K3 [N m/rad3].
+        cubic_stiffness_std: [N m/rad3].
+        damping: D [N m s/rad].
+        damping_std: [N m s/rad].
+        verdict: which terms held-out data support.
+        covariance: (3, 3) of K1, K3, D, with the uncertainty of the dynamic model in it.
+        degrees_of_freedom: of the variances.
+        linear_stiffness: K1 of the law without K3 [N m/rad].
+        linear_damping: D of the law without K3 [N m s/rad].
+        zero: difference of the zeros of theta and q that was fitted [rad]; 0 where both were taken as known.
+        rms_residual: of the spring torque [N m].
+        rms_torque: of the spring torque itself [N m].
+        largest_deflection: [rad].
+        held_out: rms on held-out pieces of the period by law [N m].
+        note: reason of the verdict, in words.
+    """
+
+    joint: str
+    stiffness: float
+    stiffness_std: float
+    cubic_stiffness: float
+    cubic_stiffness_std: float
+    damping: float
+    damping_std: float
+    verdict: Verdict
+    covariance: tuple[tuple[float, ...], ...]
+    degrees_of_freedom: float
+    linear_stiffness: float
+    linear_damping: float
+    zero: float
+    rms_residual: float
+    rms_torque: float
+    largest_deflection: float
+    held_out: dict[str, float]
+    note: str
+
+    @property
+    def law(self) -> tuple[float, float, float]:
+        """K1, K3, D that the data support: K3 is zero unless it is supported."""
+        if self.verdict is Verdict.LINEAR:
+            return self.linear_stiffness, 0.0, max(self.linear_damping, 0.0)
+        return self.stiffness, self.cubic_stiffness, max(self.damping, 0.0)
+
+    def half_width(self, level: float = 0.95) -> tuple[float, float, float]:
+        """Half widths of the intervals of K1, K3, D."""
+        factor = student_factor(self.degrees_of_freedom, level)
+        return factor * self.stiffness_std, factor * self.cubic_stiffness_std, factor * self.damping_std
+
+    def summary(self) -> str:
+        """One line."""
+        return (
+            f"{self.joint}: K1 {self.stiffness:.5g} +- {self.stiffness_std:.2g}, K3 {self.cubic_stiffness:.4g} +- "
+            f"{self.cubic_stiffness_std:.2g}, D {self.damping:.4g} +- {self.damping_std:.2g}; {self.verdict}: "
+            f"{self.note}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SpringRows:
+    """Spring torques as rows of the base parameters of the first step.
+
+    Attributes:
+        offset: (N, m) part that does not depend on them [N m]: the motor torque where motor rows are used.
+        rows: (N, m, b) ``tau_spring = offset + rows @ values``.
+    """
+
+    offset: FloatArray
+    rows: FloatArray
+
+
+def spring_rows(model: "Model", motion: Motion, tau_motor: FloatArray) -> SpringRows:
+    """The spring torque of every elastic joint from the link rows (paper, eq. 1), else from the motor rows (eq. 2).
+
+    Link rows need no torque measurement. They serve where the base parameters determine them, which is checked column
+    by column; a rigid joint before an elastic one can hide what they need.
+
+    Args:
+        model: the identified dynamic model, without springs.
+        motion: (N, n).
+        tau_motor: (N, n) [N m].
+
+    Returns:
+        Rows for the m elastic joints.
+
+    Raises:
+        IdentificationError: neither determines the spring torque.
+    """
+    robot, base = model.robot, model.base
+    elastic = robot.elastic_indices
+    rows = np.empty((len(motion), len(elastic), base.rank))
+    use_link: bool | None = None
+    for start in range(0, len(motion), 1000):
+        part = slice(start, start + 1000)
+        regressor = build_regressor(robot, model.effects, motion[part])
+        if use_link is None:
+            if _determined(regressor.link[:, elastic], base.independent, base.grouping):
+                use_link = True
+            elif _determined(regressor.motor[:, elastic], base.independent, base.grouping):
+                use_link = False
+            else:
+                raise IdentificationError(
+                    f"{robot.name}: the base parameters determine neither the link rows nor the motor rows of the "
+                    "elastic joints, so the spring torque is not known; give priors or record more kinds of motion"
+                )
+        side = regressor.link if use_link else -regressor.motor
+        rows[part] = side[:, elastic][:, :, base.independent]
+    offset = np.zeros((len(motion), len(elastic))) if use_link else tau_motor[:, elastic]
+    return SpringRows(offset, rows)
+
+
+def _determined(columns: FloatArray, independent: np.typing.NDArray[np.intp], grouping: FloatArray) -> bool:
+    """Whether rows in all parameters are rows in the base parameters."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    scale = np.abs(flat).max(axis=0)
+    left = np.abs(flat - flat[:, independent] @ grouping).max(axis=0)
+    return bool(np.all(left <= 1e-7 * np.maximum(scale, 1e-6 * scale.max(initial=0.0))))
+
+
+def identify_springs(
+    model: "Model", processed: ProcessedRecording, *, unknown_zero: Sequence[str] = ()
+) -> tuple[SpringResult, ...]:
+    """Identify the springs with a dynamic model that was identified from the same recording.
+
+    Args:
+        model: the dynamic model.
+        processed: the recording.
+        unknown_zero: joints whose encoders of theta and q have different, unknown zeros; the difference is fitted.
+
+    Returns:
+        One result for every elastic joint, in the order of the robot.
+
+    Raises:
+        IdentificationError: the spring torque cannot be computed.
+        RobotError: `unknown_zero` names a joint that is no elastic joint.
+    """
+    robot = model.robot
+    elastic = robot.elastic_indices
+    if not elastic.size:
+        return ()
+    for name in unknown_zero:
+        robot.spring(name)
+    parts = processed.period_motions or (processed.motion,)
+    mean = spring_rows(model, processed.motion, processed.tau_motor)
+    tau = mean.offset + mean.rows @ model.values
+    influences = model.uncertainty.influences
+    per_period = None
+    if processed.periods > 1 and len(influences) == processed.periods:
+        per_period = []
+        for p, motion in enumerate(parts):
+            rows = spring_rows(model, motion, processed.period_tau_motor[p])
+            per_period.append((motion, rows.offset + rows.rows @ model.values))
+    results = []
+    for k, joint in enumerate(elastic):
+        name = robot.joint_names[joint]
+        circular = circular_factor(processed, int(joint))
+        result = _one_spring(
+            name, int(joint), processed.motion, tau[:, k], mean.rows[:, k], model, per_period, k, name in unknown_zero
+        )
+        if circular is not None:
+            result = replace(
+                result,
+                verdict=Verdict.CIRCULAR,
+                note=f"the torque channel is {abs(circular):.6g} x the deflection: a fit returns that factor, whatever "
+                "the spring is",
+            )
+        results.append(result)
+    return tuple(results)
+
+
+def circular_factor(processed: ProcessedRecording, joint: int) -> float | None:
+    """The factor between a torque channel and the deflection, where that channel was computed from it.
+
+    Args:
+        processed: the recording.
+        joint: index of the joint.
+
+    Returns:
+        The factor [N m/rad], None where no torque channel is an exact multiple of the deflection.
+    """
+    channels = [processed.tau_motor[:, joint]]
+    if "tau_spring" in processed.channels:
+        channels.append(processed.channels["tau_spring"][:, joint])
+    for deflection in _raw_and_fitted_deflection(processed, joint):
+        if np.ptp(deflection) == 0.0:
+            continue
+        basis = np.column_stack([deflection, np.ones_like(deflection)])
+        for torque in channels:
+            if np.ptp(torque) == 0.0:
+                continue
+            solution, *_ = np.linalg.lstsq(basis, torque, rcond=None)
+            left = torque - basis @ solution
+            if left.std() < 1e-3 * torque.std():
+                return float(solution[0])
+    return None
+
+
+def _raw_and_fitted_deflection(processed: ProcessedRecording, joint: int) -> list[FloatArray]:
+    found = [processed.motion.deflection[:, joint]]
+    if "deflection" in processed.channels:
+        found.append(processed.channels["deflection"][:, joint])
+    return found
+
+
+def _columns(motion: Motion, joint: int, zero: float) -> FloatArray:
+    """(N, 3) columns of K1, K3, D."""
+    d = motion.deflection[:, joint] - zero
+    return np.column_stack([d, d**3, motion.deflection_rate[:, joint]])
+
+
+def _fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
+    """The difference of zeros for which the odd law fits best: Newton's steps on the offset."""
+    zero = float(np.mean(motion.deflection[:, joint]))
+    for _ in range(50):
+        columns = _columns(motion, joint, zero)
+        values = np.linalg.lstsq(columns, tau, rcond=None)[0]
+        d = columns[:, 0]
+        slope = values[0] + 3.0 * values[1] * d**2
+        full = np.column_stack([columns, -slope])
+        step = float(np.linalg.lstsq(full, tau - columns @ values, rcond=None)[0][3])
+        zero += step
+        if abs(step) <= 1e-12 * max(float(np.ptp(d)), 1e-300):
+            break
+    return zero
+
+
+def _one_spring(
+    name: str,
+    joint: int,
+    motion: Motion,
+    tau: FloatArray,
+    rows: FloatArray,
+    model: "Model",
+    per_period: list[tuple[Motion, FloatArray]] | None,
+    k: int,
+    unknown_zero: bool,
+) -> SpringResult:
+    zero = _fit_zero(motion, joint, tau) if unknown_zero else 0.0
+    columns = _columns(motion, joint, zero)
+    scale = np.linalg.norm(columns, axis=0)
+    if np.any(scale == 0.0):
+        raise IdentificationError(
+            f"joint {name!r}: the deflection theta - q is zero throughout; there is no spring in this data"
+        )
+    design = columns
+    if unknown_zero:
+        guess = np.linalg.lstsq(columns / scale, tau, rcond=None)[0] / scale
+        design = np.column_stack([columns, -(guess[0] + 3.0 * guess[1] * columns[:, 0] ** 2)])
+    norms = np.linalg.norm(design, axis=0)
+    inverse = np.linalg.pinv(design / norms) / norms[:, None]  # (3 or 4, N)
+    target = tau + design[:, 3] * 0.0 if unknown_zero else tau
+    values = inverse @ target
+    residual = target - design @ values
+    law = values[:3]
+    if per_period is not None:
+        periods = len(per_period)
+        direct = []
+        for part, part_tau in per_period:
+            direct.append(inverse[:3] @ (part_tau[:, k] - _columns(part, joint, zero) @ law))
+        moves = np.array(direct)
+        moves = (moves - moves.mean(axis=0)) / periods + model.uncertainty.influences @ (inverse[:3] @ rows).T
+        covariance = moves.T @ moves * (periods / (periods - 1.0))
+        if model.uncertainty.degrees_of_freedom != periods - 1.0:
+            # few periods: the model's own covariance is better known than from the spread of so few
+            step = inverse[:3] @ rows
+            direct_only = (np.array(direct) - np.mean(direct, axis=0)) / periods
+            covariance = step @ model.covariance @ step.T + direct_only.T @ direct_only * (periods / (periods - 1.0))
+        freedom = model.uncertainty.degrees_of_freedom
+    else:
+        step = inverse[:3] @ rows
+        covariance = step @ model.covariance @ step.T + _residual_covariance(inverse[:3], residual)
+        freedom = model.uncertainty.degrees_of_freedom
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    linear = np.linalg.lstsq(columns[:, [0, 2]] / scale[[0, 2]], tau, rcond=None)[0] / scale[[0, 2]]
+    held_out = _held_out(columns, motion, joint, zero, tau)
+    verdict, note = _verdict(law, std, freedom, held_out, float(np.std(columns[:, 0])), float(np.std(tau)))
+    return SpringResult(
+        joint=name,
+        stiffness=float(law[0]),
+        stiffness_std=float(std[0]),
+        cubic_stiffness=float(law[1]),
+        cubic_stiffness_std=float(std[1]),
+        damping=float(law[2]),
+        damping_std=float(std[2]),
+        verdict=verdict,
+        covariance=tuple(tuple(float(v) for v in row) for row in covariance),
+        degrees_of_freedom=float(freedom),
+        linear_stiffness=float(linear[0]),
+        linear_damping=float(linear[1]),
+        zero=float(zero),
+        rms_residual=float(np.sqrt(np.mean(residual**2))),
+        rms_torque=float(np.sqrt(np.mean(tau**2))),
+        largest_deflection=float(np.abs(columns[:, 0]).max()),
+        held_out=held_out,
+        note=note,
+    )
+
+
+def _residual_covariance(inverse: FloatArray, residual: FloatArray) -> FloatArray:
+    """Covariance from scores of the residual summed over pieces, where there are no periods."""
+    pieces = np.array_split(np.arange(len(residual)), min(40, max(len(residual) // 8, 1)))
+    scores = np.array([inverse[:, piece] @ residual[piece] for piece in pieces])
+    return np.asarray(scores.T @ scores, dtype=np.float64)
+
+
+def hysteresis_column(deflection: FloatArray, width: float) -> FloatArray:
+    """A Maxwell-slip element of unit strength: it follows the deflection and slips at +-width.
+
+    Args:
+        deflection: (N,) over one period or a whole recording [rad].
+        width: deflection at which it slips [rad].
+
+    Returns:
+        (N,) its torque as a share of the slip torque; run twice, so that its start does not count.
+    """
+    state, out = 0.0, np.empty_like(deflection)
+    before = float(deflection[-1])
+    for turn in range(2):
+        for k, value in enumerate(deflection):
+            state = min(max(state + (float(value) - before) / width, -1.0), 1.0)
+            before = float(value)
+            if turn:
+                out[k] = state
+    return out
+
+
+def _held_out(columns: FloatArray, motion: Motion, joint: int, zero: float, tau: FloatArray) -> dict[str, float]:
+    """Rms [N m] on pieces of the period that were left out of the fit, by law."""
+    deflection = motion.deflection[:, joint] - zero
+    reach = 3.0 * float(np.std(deflection))
+    laws = {"linear": columns[:, [0, 2]], "cubic": columns}
+    for share in (0.05, 0.2):
+        slip = hysteresis_column(deflection, max(share * reach, 1e-300))
+        laws[f"hysteresis {share:g}"] = np.column_stack([columns, slip])
+    pieces = np.array_split(np.arange(len(tau)), FOLDS)
+    found = {}
+    for label, table in laws.items():
+        total = 0.0
+        norms = np.linalg.norm(table, axis=0)
+        norms = np.where(norms > 0.0, norms, 1.0)
+        scaled = table / norms
+        for piece in pieces:
+            train = np.ones(len(tau), dtype=bool)
+            train[piece] = False
+            values = np.linalg.lstsq(scaled[train], tau[train], rcond=None)[0]
+            total += float(((tau[piece] - scaled[piece] @ values) ** 2).sum())
+        found[label] = float(np.sqrt(total / len(tau)))
+    hysteresis = min((label for label in found if label.startswith("hysteresis")), key=lambda label: found[label])
+    return {"linear": found["linear"], "cubic": found["cubic"], "hysteresis": found[hysteresis]}
+
+
+def _verdict(
+    law: FloatArray, std: FloatArray, freedom: float, held_out: dict[str, float], spread: float, torque: float
+) -> tuple[Verdict, str]:
+    """Which terms the data support: significant, and better on pieces that were left out."""
+    relative = std[0] / abs(law[0]) if law[0] != 0.0 else np.inf
+    if relative > EXCITED or torque <= 0.0:
+        return (
+            Verdict.NOT_EXCITED,
+            f"stiffness known to {100 * min(relative, 99.0):.0f} % only: deflections of {spread:.2g} (rms) are too "
+            "small",
+        )
+    linear, cubic, hysteresis = held_out["linear"], held_out["cubic"], held_out["hysteresis"]
+    limit = stats.norm.ppf(1 - SUPPORT / 2) if not np.isfinite(freedom) else stats.t.ppf(1 - SUPPORT / 2, freedom)
+    if hysteresis < 0.7 * cubic and hysteresis < 0.7 * linear and cubic > 0.01 * torque:
+        return Verdict.HYSTERETIC, f"held-out rms falls from {cubic:.3g} to {hysteresis:.3g} with a slipping element"
+    if abs(law[1]) > limit * std[1] and cubic < linear:
+        return Verdict.STIFFENING, f"held-out rms falls from {linear:.3g} to {cubic:.3g} with the cubic term"
+    return Verdict.LINEAR, f"held-out rms {linear:.3g} without and {cubic:.3g} with the cubic term"

@@ -1,0 +1,167 @@
+"""Covariance of the estimate from what the data show, not from what was assumed about the noise."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+from scipy import stats
+
+from sea_ident._typing import FloatArray
+from sea_ident.estimation.estimators import Estimate
+from sea_ident.estimation.observations import Observations
+
+FEW_PERIODS = 6
+"""Below this number of periods the spread of whole periods says too little about a variance."""
+
+BLOCK = 1.0
+"""Length of the pieces into which few periods are cut [s]."""
+
+
+class CovarianceKind(StrEnum):
+    """Where a covariance comes from."""
+
+    PERIODS = "spread between periods"
+    BLOCKS = "spread between periods, piece by piece"
+    RESIDUAL = "correlated residual"
+    MODEL = "model of white torque noise"
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Covariance of the base parameters.
+
+    Attributes:
+        covariance: (b, b).
+        degrees_of_freedom: of the variances, for Student's quantiles; infinite where they are taken as known.
+        kind: where it comes from.
+        influences: (P, b) influence of every period on the estimate, its sum zero; empty where there are no periods.
+        warnings: disagreement with the model-based covariance and the like.
+    """
+
+    covariance: FloatArray
+    degrees_of_freedom: float
+    kind: CovarianceKind
+    influences: FloatArray
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def std(self) -> FloatArray:
+        """(b,) standard deviations."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def half_width(self, level: float = 0.95) -> FloatArray:
+        """(b,) half width of the intervals that cover the truth with this probability."""
+        return student_factor(self.degrees_of_freedom, level) * self.std
+
+
+def student_factor(degrees_of_freedom: float, level: float) -> float:
+    """How many standard deviations an interval of this probability reaches to each side."""
+    if not np.isfinite(degrees_of_freedom):
+        return float(stats.norm.ppf(0.5 + level / 2.0))
+    return float(stats.t.ppf(0.5 + level / 2.0, degrees_of_freedom))
+
+
+def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncertainty:
+    """Covariance from the spread between periods; without periods, from the correlation of the residual.
+
+    The estimate solves ``Z' (torque - F values) = 0``, so period p moves it by ``(Z' F)^-1 Z' r_p / P``, with r_p the
+    residual of that period at its own motion: noise of encoders and torque, coloured or not, and what the
+    controller makes of both, are all inside. Whole periods are taken as independent; nothing is assumed within one.
+
+    Args:
+        observations: the data.
+        estimate: what was estimated from them.
+
+    Returns:
+        The covariance, with the degrees of freedom of its variances.
+
+    References:
+        Liang, Zeger, Longitudinal data analysis using generalized linear models, Biometrika, 1986.
+    """
+    if observations.periods < 2:
+        covariance = _from_residual(observations, estimate)
+        text = (
+            "one stretch of data only: standard deviations rest on the correlation of the residual, which cannot tell "
+            "noise from model error"
+        )
+        return Uncertainty(covariance, np.inf, CovarianceKind.RESIDUAL, np.zeros((0, len(estimate.values))), (text,))
+    residuals = observations.period_residuals(estimate.values)
+    residuals -= residuals.mean(axis=0)
+    periods = len(residuals)
+    influences = np.einsum("pkn,knb->pb", residuals, estimate.instruments) @ estimate.inverse.T / periods
+    if periods >= FEW_PERIODS:
+        covariance = influences.T @ influences * (periods / (periods - 1.0))
+        kind, freedom = CovarianceKind.PERIODS, periods - 1.0
+    else:
+        covariance, freedom = _from_blocks(observations, estimate, residuals)
+        kind = CovarianceKind.BLOCKS
+    return Uncertainty(covariance, freedom, kind, influences, _disagreement(observations, estimate, covariance))
+
+
+def _disagreement(observations: Observations, estimate: Estimate, covariance: FloatArray) -> tuple[str, ...]:
+    """A warning where the model-based standard deviations are far from what the periods show."""
+    assumed = np.sqrt(np.diag(estimate.covariance))
+    seen = np.sqrt(np.diag(covariance))
+    ratio = np.median(seen / np.maximum(assumed, 1e-300))
+    if 0.5 <= ratio <= 2.0:
+        return ()
+    names = observations.base.names
+    worst = int(np.argmax(np.abs(np.log(np.maximum(seen, 1e-300) / np.maximum(assumed, 1e-300)))))
+    return (
+        f"standard deviations from the spread between periods are {ratio:.2g} times those of white torque noise "
+        f"(eq. 13), at worst {seen[worst] / max(assumed[worst], 1e-300):.2g} times for {names[worst]}: the noise is "
+        "not what eq. 13 assumes; the spread between periods is reported",
+    )
+
+
+def _block_count(observations: Observations) -> int:
+    samples = observations.processed.samples
+    return int(np.clip(samples * observations.processed.interval / BLOCK, 1, max(samples // 4, 1)))
+
+
+def _from_blocks(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray, float]:
+    """Few periods: pieces of about a second, each against the same piece of the other periods, neighbours together."""
+    periods, samples = residuals.shape[:2]
+    edges = np.linspace(0, samples, _block_count(observations) + 1).astype(int)
+    parts = np.stack(
+        [np.einsum("pkn,knb->pb", residuals[:, a:b], estimate.instruments[a:b]) for a, b in pairwise(edges)],
+        axis=1,
+    )
+    parts = parts @ estimate.inverse.T / periods
+    factor = periods / (periods - 1.0)
+    own = np.einsum("pkb,pkc->bc", parts, parts)
+    if parts.shape[1] > 2:
+        neighbour = np.einsum("pkb,pkc->bc", parts, np.roll(parts, -1, axis=1))
+        covariance = own + 0.5 * (neighbour + neighbour.T)
+    else:
+        covariance = own
+    # where neighbours happen to be opposed more than they can be, they are left out
+    covariance = np.where(np.diag(covariance).min() > 0.25 * np.diag(own).min(), covariance, own) * factor
+    energy = np.einsum("pkb,pkb->kb", parts, parts)
+    share = float(np.median(energy.sum(axis=0) ** 2 / np.maximum((energy**2).sum(axis=0), 1e-300)))
+    return covariance, max((periods - 1.0) * share / 1.5, 1.0)
+
+
+def _from_residual(observations: Observations, estimate: Estimate) -> FloatArray:
+    """Without periods: scores of the residual, summed over pieces, with Bartlett weights between neighbours."""
+    residual = observations.residual(estimate.values)
+    samples = len(residual)
+    edges = np.linspace(0, samples, _block_count(observations) + 1).astype(int)
+    scores = np.stack([np.einsum("kn,knb->b", residual[a:b], estimate.instruments[a:b]) for a, b in pairwise(edges)])
+    scores = scores @ estimate.inverse.T
+    covariance = scores.T @ scores
+    for lag, weight in ((1, 2.0 / 3.0), (2, 1.0 / 3.0)):
+        if len(scores) > 3 * lag:
+            product = scores[lag:].T @ scores[:-lag]
+            covariance = covariance + weight * (product + product.T)
+    freedom = max(len(scores) - len(estimate.values) / max(residual.shape[1], 1), 1.0)
+    floor = np.diag(estimate.covariance)
+    covariance = covariance * (len(scores) / freedom)
+    low = np.diag(covariance) < floor
+    if np.any(low):
+        scale = np.where(low, np.sqrt(floor / np.maximum(np.diag(covariance), 1e-300)), 1.0)
+        if np.any(np.diag(covariance) <= 0.0):
+            return estimate.covariance
+        covariance = covariance * np.outer(scale, scale)
+    return np.asarray(covariance, dtype=np.float64)

@@ -1,0 +1,74 @@
+"""Recordings without a period: zero-phase filtering and central differences."""
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import RecordingError
+
+ORDER = 4
+
+
+def choose_cutoff(values: FloatArray, interval: float) -> float:
+    """Frequency up to which positions stand out of their noise.
+
+    The spectrum of the windowed second difference is that of the acceleration; above the cutoff it is noise, whose
+    level per frequency is that of a white position noise times the fourth power of frequency.
+
+    Args:
+        values: (N, n) positions.
+        interval: [s].
+
+    Returns:
+        Cutoff [Hz], between 10 intervals of the record length and 0.2 of the sample rate.
+    """
+    samples = len(values)
+    detrended = values - np.linspace(0.0, 1.0, samples)[:, None] * (values[-1] - values[0]) - values[0]
+    window = np.hanning(samples)[:, None] ** 2
+    power = np.abs(np.fft.rfft(detrended * window, axis=0)) ** 2
+    frequency = np.fft.rfftfreq(samples, interval)
+    bands = np.array_split(np.arange(1, len(frequency)), min(400, max(len(frequency) // 8, 2)))
+    level = np.array([power[band].mean(axis=0) for band in bands])
+    centre = np.array([frequency[band].mean() for band in bands])
+    floor = np.median(level[len(level) // 2 :], axis=0)
+    highest = 0.0
+    for i in range(values.shape[1]):
+        above = np.flatnonzero(level[:, i] > 10.0 * floor[i])
+        run = 0
+        for k in above:  # the first stretch without a gap
+            if k > run + 2:
+                break
+            run = int(k)
+        highest = max(highest, float(centre[run]))
+    lowest = 10.0 / (samples * interval)
+    return float(np.clip(1.5 * highest, lowest, 0.2 / interval))
+
+
+def zero_phase(values: FloatArray, interval: float, cutoff: float, source: str) -> FloatArray:
+    """Butterworth filter, forwards and backwards.
+
+    Args:
+        values: (N, n).
+        interval: [s].
+        cutoff: [Hz].
+        source: for messages.
+
+    Returns:
+        (N, n) filtered values.
+
+    Raises:
+        RecordingError: too few samples, or a cutoff outside what the sample rate allows.
+    """
+    if len(values) < 30:
+        raise RecordingError(f"{source}: {len(values)} samples are too few for a filter; record longer")
+    nyquist = 0.5 / interval
+    if not 0.0 < cutoff < nyquist:
+        raise RecordingError(f"{source}: a cutoff of {cutoff:g} Hz is outside 0 .. {nyquist:g} Hz; choose another")
+    sections = butter(ORDER, cutoff / nyquist, output="sos")
+    pad = min(len(values) - 1, int(3.0 / (cutoff * interval)) + 3 * (2 * len(sections) + 1))
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=pad), dtype=np.float64)
+
+
+def central_difference(values: FloatArray, interval: float) -> FloatArray:
+    """(N, n) central differences; one-sided of second order at both ends."""
+    return np.asarray(np.gradient(values, interval, axis=0, edge_order=2), dtype=np.float64)

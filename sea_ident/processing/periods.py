@@ -1,0 +1,188 @@
+"""Whole periods out of a recording: their length, their place, and whether they are periods at all."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import RecordingError
+
+REPEATS_WITHIN = 0.02
+"""Mean square difference of two periods, as a share of twice the variance, up to which a lag counts as a period."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Where the whole periods lie.
+
+    Attributes:
+        period: [s].
+        samples: N per period.
+        periods: P.
+        first: index of the first sample used where the samples fall on the period, else -1.
+        start: time of the first sample used [s].
+    """
+
+    period: float
+    samples: int
+    periods: int
+    first: int
+    start: float
+
+    def stack(self, time: FloatArray, values: FloatArray) -> FloatArray:
+        """(P, N, k) periods of the samples (M, k); resampled by cubic splines where they fall beside the grid."""
+        shape = (self.periods, self.samples, values.shape[1])
+        if self.first >= 0:
+            stop = self.first + self.periods * self.samples
+            return np.ascontiguousarray(values[self.first : stop]).reshape(shape)
+        steps = np.arange(self.periods * self.samples) * (self.period / self.samples)
+        spline = make_interp_spline(time, values, k=3)
+        return np.asarray(spline(np.minimum(self.start + steps, time[-1])), dtype=np.float64).reshape(shape)
+
+
+def mismatch(values: FloatArray) -> FloatArray:
+    """How badly a uniformly sampled signal (M, k) repeats itself after every lag.
+
+    Returns:
+        (M - M // 4,) for lags 0, 1, ...: mean square difference over twice the variance; 1 for unrelated samples.
+    """
+    samples = len(values)
+    lags = samples - max(samples // 4, 1)
+    total = np.zeros(lags)
+    columns = [column - column.mean() for column in values.T]
+    columns = [column / column.std() for column in columns if column.std() > 0.0]
+    size = 1 << int(np.ceil(np.log2(2 * samples)))
+    count = samples - np.arange(lags)
+    for column in columns:
+        spectrum = np.fft.rfft(column, size)
+        products = np.fft.irfft(np.abs(spectrum) ** 2, size)[:lags]
+        energy = np.concatenate([[0.0], np.cumsum(column**2)])
+        head = energy[samples - np.arange(lags)]
+        tail = energy[samples] - energy[np.arange(lags)]
+        total += (head + tail - 2.0 * products) / (2.0 * count)
+    if not columns:
+        return np.ones(lags)
+    return np.maximum(total / len(columns), 0.0)
+
+
+def detect_period(time: FloatArray, values: FloatArray) -> float | None:
+    """The period of signals, if they repeat themselves unambiguously.
+
+    Args:
+        time: (M,) uniform times [s].
+        values: (M, k) signals.
+
+    Returns:
+        The smallest lag [s] after which all signals repeat, refined between samples; None where there is none.
+    """
+    interval = float((time[-1] - time[0]) / (len(time) - 1))
+    thin = max(1, len(time) // 200_000)
+    values, interval = values[::thin], interval * thin
+    if not np.any(values.std(axis=0) > 0.0):
+        return None
+    error = mismatch(values)
+    # leave the neighbourhood of lag zero: a period starts where the signal has first become unlike itself
+    unlike = np.flatnonzero(error > 0.2)
+    if not unlike.size:
+        return None
+    inner = np.arange(max(int(unlike[0]), 1), len(error) - 1)
+    minima = inner[(error[inner] <= error[inner - 1]) & (error[inner] <= error[inner + 1])]
+    minima = minima[error[minima] < REPEATS_WITHIN]
+    if not minima.size:
+        return None
+    best = float(error[minima].min())
+    good = minima[error[minima] <= max(4.0 * best, 1e-9)]
+    lag = int(good[0])
+    left, middle, right = error[lag - 1], error[lag], error[lag + 1]
+    curvature = left - 2.0 * middle + right
+    shift = 0.5 * (left - right) / curvature if curvature > 0.0 else 0.0
+    periods = len(values) / lag
+    # many logs hold a whole number of samples per period; what is that within the accuracy of the lag is that
+    refined = lag + float(np.clip(shift, -0.5, 0.5))
+    if abs(refined - lag) < 0.3 / max(periods, 1.0) + 0.1:
+        refined = float(lag)
+    return refined * interval
+
+
+def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> Cut:
+    """The last whole periods of a recording.
+
+    Args:
+        time: (M,) [s].
+        uniform: whether the samples are evenly spaced.
+        period: [s].
+        source: for messages.
+
+    Returns:
+        Where they lie.
+
+    Raises:
+        RecordingError: if the recording is shorter than one period, or has fewer than 8 samples in it.
+    """
+    if not (np.isfinite(period) and period > 0.0):
+        raise RecordingError(f"{source}: the period is {period} s; it must be positive")
+    interval = float((time[-1] - time[0]) / (len(time) - 1))
+    length = interval * len(time)  # the last sample lasts as long as the others
+    periods = int(np.floor(length / period + 1e-6))
+    if periods < 1:
+        raise RecordingError(
+            f"{source}: the recording lasts {length:g} s, less than one period of {period:g} s; "
+            "record at least one whole period, better ten or more, or correct the period"
+        )
+    samples = round(period / interval)
+    if samples < 8:
+        raise RecordingError(
+            f"{source}: {samples} samples in a period of {period:g} s are too few; is the period in seconds?"
+        )
+    aligned = uniform and abs(samples * interval - period) * periods <= 0.05 * interval
+    if aligned:
+        periods = min(periods, len(time) // samples)
+        first = len(time) - periods * samples
+        return Cut(period, samples, periods, first, float(time[first]))
+    start = float(time[-1]) + interval - periods * period
+    if start < time[0]:
+        start = float(time[0])
+    return Cut(period, samples, periods, -1, start)
+
+
+def leading_transients(stack: FloatArray) -> int:
+    """How many periods at the beginning are not yet like the others.
+
+    Args:
+        stack: (P, N, k) positions of all periods.
+
+    Returns:
+        Number of leading periods that differ from the middle one of the later half by more than five times the usual
+        distance; at most half of them.
+    """
+    count = len(stack)
+    if count < 4:
+        return 0
+    later = stack[count // 2 :]
+    middle = np.median(later, axis=0)
+    scale = np.maximum(stack.std(axis=(0, 1)), 1e-300)
+    distance = np.sqrt(np.mean(((stack - middle) / scale) ** 2, axis=(1, 2)))
+    usual = float(np.median(distance[count // 2 :]))
+    limit = max(5.0 * usual, 1e-7)
+    drop = 0
+    while drop < count // 2 and distance[drop] > limit:
+        drop += 1
+    return drop
+
+
+def repeated_periods(stack: FloatArray) -> list[tuple[int, int]]:
+    """Pairs (copy, original) of periods that agree in every sample of every signal.
+
+    Args:
+        stack: (P, N, k) all signals of all periods.
+    """
+    seen: dict[bytes, int] = {}
+    pairs = []
+    for p in range(len(stack)):
+        key = np.ascontiguousarray(stack[p]).tobytes()
+        if key in seen:
+            pairs.append((p, seen[key]))
+        else:
+            seen[key] = p
+    return pairs

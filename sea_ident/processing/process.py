@@ -1,0 +1,307 @@
+"""`process`: from a recording to mean motion, derivatives, motor torque and its variance."""
+
+import warnings as python_warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import RecordingError, SeaIdentWarning
+from sea_ident.motion import Motion
+from sea_ident.processing import filtering, harmonics, periods, torque, variance
+from sea_ident.processing.processed import ProcessedRecording
+from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
+
+SMOOTHING = 0.5
+"""Width [s] of the window over which the torque variance is smoothed."""
+
+OTHER_CHANNELS = ("current", "tau_spring", "temperature", "external_force", "q_reference", "theta_reference")
+
+
+@dataclass(frozen=True, eq=False)
+class _Signals:
+    """Columns of a recording in the order of the robot."""
+
+    q: FloatArray
+    theta: FloatArray
+    torque: torque.TorqueSource
+    others: dict[str, FloatArray]
+    warnings: list[str]
+    notes: list[str]
+
+
+def process(
+    recording: Recording,
+    robot: Robot,
+    *,
+    period: float | None = None,
+    link_harmonics: int | None = None,
+    motor_harmonics: int | None = None,
+    smoothing: float = SMOOTHING,
+    cutoff: float | None = None,
+) -> ProcessedRecording:
+    """Process a recording for identification or validation.
+
+    A periodic recording is cut to its last whole periods, averaged, and q and theta are fitted by Fourier series that
+    are differentiated analytically (paper, II.C and III.D). The torque is averaged and not filtered: the regressor
+    lacks what the fit of q leaves out, which is noise by the choice of the harmonics; a filter on the torque would
+    take from it what the Coulomb columns, not band-limited, still hold. A recording that is not periodic is filtered
+    forwards and backwards, positions only, for the same reason.
+
+    Args:
+        recording: the recording.
+        robot: the robot; every joint needs q, an elastic one theta, and each tau_motor or current.
+        period: [s]; found from the data where it is None and the data repeat themselves unambiguously.
+        link_harmonics: harmonics of q; chosen from the data where None.
+        motor_harmonics: harmonics of theta; chosen from the data where None.
+        smoothing: width of the window for the torque variance [s].
+        cutoff: of the filter for recordings without a period [Hz]; chosen from the data where None.
+
+    Returns:
+        The processed recording; what was found and done is in its notes and warnings.
+
+    Raises:
+        RecordingError: a column is missing, the recording is shorter than one period, or nothing moves.
+    """
+    signals = _signals(recording, robot)
+    uniform = recording.is_uniform
+    if period is None:
+        period = _detected(recording, robot, signals, uniform)
+    if period is None:
+        result = _not_periodic(recording, robot, signals, uniform, cutoff)
+    else:
+        result = _periodic(recording, robot, signals, uniform, period, link_harmonics, motor_harmonics, smoothing)
+    for text in result.warnings:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+    return result
+
+
+def _signals(recording: Recording, robot: Robot) -> _Signals:
+    names = robot.joint_names
+    q = recording.channel("q", names)
+    theta = q.copy()
+    for i in robot.elastic_indices:
+        theta[:, i] = recording.channel("theta", [names[i]])[:, 0]
+    found: list[str] = []
+    notes: list[str] = []
+    still = [name for i, name in enumerate(names) if np.ptp(q[:, i]) == 0.0]
+    if len(still) == robot.n:
+        raise RecordingError(
+            f"{recording.source}: no joint moves: {', '.join(f'q_{name}' for name in still)} "
+            f"{'is' if len(still) == 1 else 'are'} constant; nothing can be identified at rest"
+        )
+    if still:
+        found.append(
+            f"{recording.source}: {', '.join(f'q_{name}' for name in still)} constant: what only the motion of "
+            "these joints shows cannot be told"
+        )
+    for i in robot.elastic_indices:
+        if np.array_equal(theta[:, i], q[:, i]):
+            found.append(
+                f"{recording.source}: theta_{names[i]} and q_{names[i]} are the same numbers: without a deflection "
+                "there is no spring to be identified"
+            )
+    source = torque.torque_source(recording, robot)
+    found.extend(source.warnings)
+    notes.extend(source.notes)
+    others = {
+        kind: recording.channel(kind, names) for kind in OTHER_CHANNELS if all(recording.has(kind, j) for j in names)
+    }
+    return _Signals(q, theta, source, others, found, notes)
+
+
+def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bool) -> float | None:
+    """The period that the data show, with a note; the reference counts where there is one, as it has no noise."""
+    reference = [signals.others[kind] for kind in ("q_reference", "theta_reference") if kind in signals.others]
+    values = np.concatenate(reference, axis=1) if reference else signals.q
+    time = recording.time
+    if not uniform:
+        grid = np.linspace(time[0], time[-1], len(time))
+        values = np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+        time = grid
+    found = periods.detect_period(time, values)
+    if found is not None:
+        signals.notes.append(f"period {found:.6g} s found from the {'reference' if reference else 'link positions'}")
+    return found
+
+
+def _periodic(
+    recording: Recording,
+    robot: Robot,
+    signals: _Signals,
+    uniform: bool,
+    period: float,
+    link_harmonics: int | None,
+    motor_harmonics: int | None,
+    smoothing: float,
+) -> ProcessedRecording:
+    found, notes = list(signals.warnings), list(signals.notes)
+    cut = periods.cut_periods(recording.time, uniform, period, recording.source)
+    if cut.first < 0:
+        notes.append(
+            f"{'samples are not evenly spaced' if not uniform else 'the period is no multiple of the sample time'}: "
+            f"resampled to {cut.samples} samples a period by cubic splines"
+        )
+    stacks = {"q": signals.q, "theta": signals.theta, "torque": signals.torque.values, **signals.others}
+    cuts = {name: cut.stack(recording.time, values) for name, values in stacks.items()}
+    keep = _kept_periods(recording.source, cuts, found, notes)
+    cuts = {name: values[keep] for name, values in cuts.items()}
+    count = len(keep)
+    _check_periodicity(recording.source, robot, cuts["q"], period, found)
+    if count == 1:
+        found.append(
+            f"{recording.source}: one period only: there is no scatter between periods; the variance of the torque is "
+            "estimated from its fast part, one number per joint. Record more periods"
+        )
+
+    most = max((cut.samples - 1) // 3, 1)
+    elastic = robot.elastic_indices
+    links = link_harmonics or harmonics.choose_harmonics(cuts["q"], most)
+    motors = links
+    if elastic.size:
+        motors = motor_harmonics or harmonics.choose_harmonics(cuts["theta"][:, :, elastic], most)
+    for label, number in (("link_harmonics", links), ("motor_harmonics", motors)):
+        if not 1 <= number <= (cut.samples - 1) // 2:
+            raise RecordingError(
+                f"{recording.source}: {label} is {number}; {cut.samples} samples allow 1 .. {(cut.samples - 1) // 2}"
+            )
+    time: FloatArray = np.arange(cut.samples, dtype=np.float64) * (period / cut.samples)
+    motion = _motion(time, period, cuts["q"].mean(axis=0), cuts["theta"].mean(axis=0), links, motors, elastic)
+    parts: tuple[Motion, ...] = ()
+    if count > 1:
+        parts = tuple(
+            _motion(time, period, cuts["q"][p], cuts["theta"][p], links, motors, elastic) for p in range(count)
+        )
+    factor = torque.transmitted(cuts["torque"].mean(axis=0), signals.torque.efficiency, motion.dtheta)
+    tau = cuts["torque"] * factor
+    if count > 1:
+        raw = variance.sample_variance(tau)
+        smooth = variance.smooth_over_phase(raw, period / cut.samples, smoothing)
+    else:
+        raw = np.broadcast_to(variance.noise_from_curvature(tau[0]), tau[0].shape).copy()
+        smooth = raw
+    return ProcessedRecording(
+        source=recording.source,
+        joint_names=robot.joint_names,
+        motion=motion,
+        tau_motor=tau.mean(axis=0),
+        tau_variance=smooth,
+        raw_tau_variance=raw,
+        periods=count,
+        period=float(period),
+        period_motions=parts,
+        period_tau_motor=tau,
+        channels={name: cuts[name].mean(axis=0) for name in signals.others},
+        link_harmonics=int(links),
+        motor_harmonics=int(motors),
+        notes=tuple(notes),
+        warnings=tuple(found),
+    )
+
+
+def _kept_periods(source: str, cuts: dict[str, FloatArray], found: list[str], notes: list[str]) -> list[int]:
+    """Periods without transients and without copies of others."""
+    count = len(cuts["q"])
+    drop = periods.leading_transients(np.concatenate([cuts["q"], cuts["theta"]], axis=2))
+    if drop:
+        notes.append(f"the first {drop} of {count} periods differ from the later ones and were left out as transient")
+    keep = list(range(drop, count))
+    everything = np.concatenate([cuts[name][keep] for name in ("q", "theta", "torque")], axis=2)
+    copies = [(keep[a], keep[b]) for a, b in periods.repeated_periods(everything)]
+    if copies:
+        found.append(
+            f"{source}: periods {', '.join(f'{a + 1} and {b + 1}' for a, b in copies[:3])} "
+            f"{'and others ' if len(copies) > 3 else ''}are the same numbers: measurements never are. "
+            f"{len(copies)} copies were left out"
+        )
+        dropped = {a for a, _ in copies}
+        keep = [p for p in keep if p not in dropped]
+    return keep
+
+
+def _check_periodicity(source: str, robot: Robot, stack: FloatArray, period: float, found: list[str]) -> None:
+    """Warn where the periods differ so much that the period must be wrong."""
+    if len(stack) < 2:
+        return
+    within = stack.std(axis=(0, 1))
+    between = np.sqrt(np.mean(stack.var(axis=0, ddof=1), axis=0))
+    for i, name in enumerate(robot.joint_names):
+        if between[i] > 0.1 * within[i] > 0.0:
+            found.append(
+                f"{source}: q_{name} differs between periods of {period:g} s by {between[i]:.3g}, "
+                f"{100 * between[i] / within[i]:.0f} % of its motion: is that the period?"
+            )
+
+
+def _motion(
+    time: FloatArray,
+    period: float,
+    q: FloatArray,
+    theta: FloatArray,
+    links: int,
+    motors: int,
+    elastic: np.typing.NDArray[np.intp],
+) -> Motion:
+    q, dq, ddq = harmonics.differentiate(q, period, links)
+    motor = [q.copy(), dq.copy(), ddq.copy()]
+    if elastic.size:
+        for whole, part in zip(motor, harmonics.differentiate(theta[:, elastic], period, motors), strict=True):
+            whole[:, elastic] = part
+    return Motion(time, q, dq, ddq, *motor)
+
+
+def _not_periodic(
+    recording: Recording, robot: Robot, signals: _Signals, uniform: bool, cutoff: float | None
+) -> ProcessedRecording:
+    found, notes = list(signals.warnings), list(signals.notes)
+    source, elastic = recording.source, robot.elastic_indices
+    interval = recording.duration / (recording.samples - 1)
+    time = recording.time
+    values = {"q": signals.q, "theta": signals.theta, "torque": signals.torque.values, **signals.others}
+    if not uniform:
+        grid = np.linspace(time[0], time[-1], len(time))
+        values = {
+            name: np.stack([np.interp(grid, time, column) for column in table.T], axis=1)
+            for name, table in values.items()
+        }
+        time = grid
+        notes.append("samples are not evenly spaced: interpolated linearly to an even grid")
+    positions = np.concatenate([values["q"], values["theta"][:, elastic]], axis=1)
+    frequency = cutoff or filtering.choose_cutoff(positions, interval)
+    smooth = filtering.zero_phase(positions, interval, frequency, source)
+    rate = filtering.central_difference(smooth, interval)
+    acceleration = filtering.central_difference(rate, interval)
+    found.append(
+        f"{source}: no period: positions filtered forwards and backwards at {frequency:.3g} Hz and differentiated; "
+        "without periods there is no scatter to judge the torque noise by"
+    )
+    edge = min(int(np.ceil(1.0 / (frequency * interval))), recording.samples // 8)
+    inside = slice(edge, recording.samples - edge)
+    notes.append(f"{edge} samples at both ends were left out, where the filter has no data on one side")
+    parts = []
+    for table in (smooth, rate, acceleration):
+        motor = table[:, : robot.n].copy()
+        motor[:, elastic] = table[:, robot.n :]
+        parts.append((table[inside, : robot.n].copy(), motor[inside]))
+    motion = Motion(time[inside], *(p[0] for p in parts), *(p[1] for p in parts))
+    load = values["torque"][inside]
+    tau = load * torque.transmitted(load, signals.torque.efficiency, motion.dtheta)
+    spread = np.broadcast_to(variance.noise_from_curvature(tau), tau.shape)
+    return ProcessedRecording(
+        source=source,
+        joint_names=robot.joint_names,
+        motion=motion,
+        tau_motor=tau,
+        tau_variance=spread,
+        raw_tau_variance=spread,
+        periods=1,
+        period=None,
+        period_motions=(),
+        period_tau_motor=tau[None],
+        channels={name: values[name][inside] for name in signals.others},
+        link_harmonics=0,
+        motor_harmonics=0,
+        notes=tuple(notes),
+        warnings=tuple(found),
+    )

@@ -1,0 +1,105 @@
+"""Motor torque at the joint side: measured, or from the current (paper, eqs. 6-7)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import RecordingError
+from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
+
+SATURATED_SHARE = 0.005
+"""Share of the samples at the very extreme of a current from which on it is called saturated."""
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueSource:
+    """Where the torque of every joint comes from, before the efficiency.
+
+    Attributes:
+        values: (M, n) torque at the joint side without losses of the transmission [N m] or [N].
+        efficiency: (n,) eta where the torque comes from a current, 1 where it was measured [-].
+        notes: what was used.
+        warnings: saturation and the like.
+    """
+
+    values: FloatArray
+    efficiency: FloatArray
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
+    """Measured torques where there are, else currents times torque constant and gear ratio.
+
+    Args:
+        recording: the recording.
+        robot: the robot.
+
+    Returns:
+        The torques.
+
+    Raises:
+        RecordingError: a joint has neither, or a current without a torque constant.
+    """
+    values = np.empty((recording.samples, robot.n))
+    efficiency = np.ones(robot.n)
+    notes, warnings = [], []
+    for i, joint in enumerate(robot.joints):
+        if recording.has("tau_motor", joint.name):
+            values[:, i] = recording.channel("tau_motor", [joint.name])[:, 0]
+            if recording.has("current", joint.name):
+                notes.append(f"{joint.name}: tau_motor_{joint.name} is used, current_{joint.name} is not")
+            kind = "tau_motor"
+        elif recording.has("current", joint.name):
+            actuator = joint.actuator
+            if actuator is None or actuator.torque_constant is None:
+                raise RecordingError(
+                    f"{recording.source}: joint {joint.name!r} has only current_{joint.name}, and the annotation of "
+                    f"{robot.name} gives no <torqueConstant> for it; add it, or record tau_motor_{joint.name}"
+                )
+            current = recording.channel("current", [joint.name])[:, 0]
+            values[:, i] = actuator.gear_ratio * actuator.torque_constant * current
+            efficiency[i] = 1.0 if actuator.efficiency is None else actuator.efficiency
+            kind = "current"
+        else:
+            raise RecordingError(
+                f"{recording.source}: joint {joint.name!r} has neither tau_motor_{joint.name} nor "
+                f"current_{joint.name}; without a motor torque nothing can be identified. "
+                f"There are: time, {', '.join(recording.columns)}"
+            )
+        text = _saturation(values[:, i], f"{kind}_{joint.name}", recording.source)
+        if text:
+            warnings.append(text)
+    return TorqueSource(values, efficiency, tuple(notes), tuple(warnings))
+
+
+def transmitted(torque: FloatArray, efficiency: FloatArray, direction: FloatArray) -> FloatArray:
+    """Factor of the transmission, eta where the motor drives and 1 / eta where it is driven (paper, eq. 7).
+
+    Args:
+        torque: (N, n) mean torque without losses, which decides the direction so that noise is not rectified.
+        efficiency: (n,) eta [-].
+        direction: (N, n) motor velocity.
+
+    Returns:
+        (N, n) factor [-].
+    """
+    sign = np.sign(torque * direction)
+    return efficiency**sign
+
+
+def _saturation(values: FloatArray, column: str, source: str) -> str:
+    for extreme, side in ((values.max(), "highest"), (values.min(), "lowest")):
+        if values.max() == values.min():
+            return f"{source}: column {column} is constant, {values[0]:g}: it is no measured torque"
+        at = np.isclose(values, extreme, rtol=1e-9, atol=0.0)
+        # a sampled signal has a flat top only where something cuts it
+        flat = at[1:] & at[:-1]
+        if flat.mean() > SATURATED_SHARE and abs(extreme) > 0.5 * np.abs(values).max():
+            return (
+                f"{source}: column {column} stays at its {side} value in {100.0 * at.mean():.1f} % of the samples: "
+                "it is saturated, and torque beyond it is missing. Leave out that part or excite less"
+            )
+    return ""

@@ -1,0 +1,126 @@
+"""`validate`: how well a model predicts a recording that was not used to find it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.estimation import Model
+from sea_ident.exceptions import RecordingError
+from sea_ident.processing import ProcessedRecording, process
+from sea_ident.recordings import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Prediction of a recording.
+
+    Attributes:
+        recording: where the data came from.
+        joint_names: (n,).
+        rms: (n,) rms of measured less predicted torque [N m] or [N].
+        noise_std: (n,) standard deviation of the noise of that torque [N m] or [N].
+        rms_torque: (n,) rms of the measured torque [N m] or [N].
+        nrms: (n,) `rms` over `rms_torque` [-].
+        samples: number of samples that were compared.
+        processed: the recording as it was compared.
+        predicted: (N, n) predicted torque [N m] or [N].
+        used: (N,) which samples were compared.
+        warnings: what a user should know.
+    """
+
+    recording: str
+    joint_names: tuple[str, ...]
+    rms: FloatArray
+    noise_std: FloatArray
+    rms_torque: FloatArray
+    nrms: FloatArray
+    samples: int
+    processed: ProcessedRecording
+    predicted: FloatArray
+    used: np.typing.NDArray[np.bool_]
+    warnings: tuple[str, ...] = ()
+
+    def summary(self) -> str:
+        """One line per joint."""
+        lines = [f"prediction of {self.recording}, {self.samples} samples"]
+        for i, name in enumerate(self.joint_names):
+            lines.append(
+                f"  {name}: rms {self.rms[i]:.4g} of {self.rms_torque[i]:.4g} ({100 * self.nrms[i]:.2f} %), noise "
+                f"{self.noise_std[i]:.3g}"
+            )
+        lines.extend(f"  warning: {text}" for text in self.warnings)
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """rms, noise_std and nrms per joint, for `sea-ident validate --json`."""
+        named = {"rms": self.rms, "noise_std": self.noise_std, "rms_torque": self.rms_torque, "nrms": self.nrms}
+        record: dict[str, Any] = {
+            key: {name: float(v) for name, v in zip(self.joint_names, values, strict=True)}
+            for key, values in named.items()
+        }
+        return {**record, "samples": self.samples, "recording": self.recording, "warnings": list(self.warnings)}
+
+
+def validate(
+    model: Model,
+    recording: Recording | ProcessedRecording,
+    *,
+    period: float | None = None,
+    link_harmonics: int | None = None,
+    motor_harmonics: int | None = None,
+) -> Validation:
+    """Compare the torque that a model predicts with the torque that was measured.
+
+    Where a column ``external_force_<joint>`` says that something pushed, those samples are left out.
+
+    Args:
+        model: the model.
+        recording: a recording that was not used to identify it.
+        period: [s]; found from the data where None; a recording without a period is filtered instead.
+        link_harmonics: harmonics of q; chosen from the data where None.
+        motor_harmonics: harmonics of theta; chosen from the data where None.
+
+    Returns:
+        Rms of the difference per joint, beside the noise.
+
+    Raises:
+        RecordingError: a column is missing, or an external force acts throughout.
+    """
+    if isinstance(recording, ProcessedRecording):
+        processed = recording
+    else:
+        processed = process(
+            recording, model.robot, period=period, link_harmonics=link_harmonics, motor_harmonics=motor_harmonics
+        )
+    predicted = model.predict(processed.motion, processed.channels)
+    used = np.ones(processed.samples, dtype=bool)
+    found = list(processed.warnings)
+    if "external_force" in processed.channels:
+        used = np.all(processed.channels["external_force"] == 0.0, axis=1)
+        if not np.any(used):
+            raise RecordingError(f"{processed.source}: an external force acts at every sample; nothing can be compared")
+        if not np.all(used):
+            found.append(
+                f"{processed.source}: {np.count_nonzero(~used)} of {len(used)} samples are left out, where an external "
+                "force acts"
+            )
+    difference = (processed.tau_motor - predicted)[used]
+    rms = np.sqrt(np.mean(difference**2, axis=0))
+    rms_torque = np.sqrt(np.mean(processed.tau_motor[used] ** 2, axis=0))
+    noise = np.sqrt(processed.raw_tau_variance[used].mean(axis=0) / processed.periods)
+    nrms = np.divide(rms, rms_torque, out=np.full_like(rms, np.inf), where=rms_torque > 0.0)
+    return Validation(
+        recording=processed.source,
+        joint_names=processed.joint_names,
+        rms=rms,
+        noise_std=noise,
+        rms_torque=rms_torque,
+        nrms=nrms,
+        samples=int(np.count_nonzero(used)),
+        processed=processed,
+        predicted=predicted,
+        used=used,
+        warnings=tuple(found),
+    )
