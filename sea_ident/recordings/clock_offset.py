@@ -1,7 +1,6 @@
 """The offset between two clocks, from the motion of the joints that both have seen."""
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
@@ -34,6 +33,8 @@ def estimate_offset(stream: Recording, reference: Recording, largest: float, whe
         RecordingError: no joint in common, too little overlap, no motion, too little likeness, or an offset at
             the bound.
     """
+    from scipy.optimize import minimize_scalar
+
     pairs = _pairs(stream, reference)
     if not pairs:
         raise RecordingError(

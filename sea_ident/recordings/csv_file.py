@@ -18,6 +18,7 @@ LONGEST_HEADER = 1_000_000
 """Characters in the header row."""
 
 _ROWS_AT_ONCE = 8192
+_COPIES = 3
 
 
 def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
@@ -29,7 +30,7 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
     Args:
         path: The file.
         names: Columns wanted besides those that bear a name of the project; all if None.
-        memory_limit: Largest size of the file [bytes].
+        memory_limit: Bytes that the file may take, counting the copies made on the way.
 
     Returns:
         The table.
@@ -37,17 +38,17 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
     Raises:
         RecordingError: not a CSV file with a header of names and rows of numbers; says the line and column.
     """
-    check_size(path.stat().st_size, memory_limit, path)
+    check_size(_COPIES * path.stat().st_size, memory_limit, path)
     text = _decode(path)
     header, start, first_line = _header(text, path)
     wanted = [i for i, name in enumerate(header) if is_wanted(name, names)]
     if not wanted:
         raise RecordingError(f"{path}: none of the columns asked for; there are: {', '.join(header)}")
-    if not text[start:].strip():
+    body = text[start:].rstrip()
+    if not body:
         raise RecordingError(f"{path}: a header, but no rows of numbers")
     table = None
-    # Cells are counted before parsing: with usecols a row with too many would pass unseen.
-    if '"' not in text and "\r" not in text and _rectangular(text, start, len(header)):
+    if '"' not in body and _rectangular(body, len(header)):
         with suppress(ValueError), open(path, encoding="utf-8-sig") as file:
             table = np.loadtxt(
                 file,
@@ -58,7 +59,7 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
                 usecols=None if len(wanted) == len(header) else wanted,
             )
     if table is None:
-        table = _parse_slowly(text[start:], header, wanted, first_line, path)
+        table = _parse_slowly(body, header, wanted, first_line, path)
     columns = {header[i]: table[:, k] for k, i in enumerate(wanted)}
     return RawTable(columns, left_out=tuple(name for name in header if name not in columns))
 
@@ -94,7 +95,7 @@ def _decode(path: Path) -> str:
             f"{path}, line {line}: byte 0x{data[error.start]:02x} at {error.start} is not UTF-8 text; "
             "is it a CSV file? If so, save it as UTF-8"
         ) from error
-    return text.replace("\r\n", "\n") if "\r\n" in text else text
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
 def _header(text: str, path: Path) -> tuple[list[str], int, int]:
@@ -143,16 +144,21 @@ def _check_header(header: list[str], row: str, line: int, path: Path) -> None:
         seen[name] = i
 
 
-def _rectangular(text: str, start: int, width: int) -> bool:
-    """Whether the number of commas fits; a cheap check that finds nearly all ragged rows."""
-    rows = text.count("\n", start) + (not text.endswith("\n"))
-    return text.count(",", start) == rows * (width - 1)
+def _rectangular(body: str, width: int) -> bool:
+    """Whether every row has as many cells as there are columns; numpy does not look where it reads some only."""
+    data = np.frombuffer(body.encode(), dtype=np.uint8)
+    marks = data[(data == ord(",")) | (data == ord("\n"))]
+    if (marks.size + 1) % width:
+        return False
+    rows = np.append(marks, np.uint8(ord("\n"))).reshape(-1, width)
+    return bool(np.all(rows[:, -1] == ord("\n")) and np.all(rows[:, :-1] == ord(",")))
 
 
 def _parse_slowly(body: str, header: list[str], wanted: list[int], line: int, path: Path) -> FloatArray:
     """Parse cell by cell, to handle quotes and to say exactly what is wrong where."""
+    blocks: list[FloatArray] = []
     rows: list[list[float]] = []
-    reader = csv.reader(io.StringIO(body), strict=True)
+    reader = csv.reader(io.StringIO(body), strict=True, skipinitialspace=True)
     try:
         for cells in reader:
             if not cells or (len(cells) == 1 and not cells[0].strip()):
@@ -161,11 +167,14 @@ def _parse_slowly(body: str, header: list[str], wanted: list[int], line: int, pa
             if len(cells) != len(header):
                 raise RecordingError(_ragged(cells, header, where))
             rows.append([_number(cells[i], header[i], where) for i in wanted])
+            if len(rows) == _ROWS_AT_ONCE:
+                blocks.append(np.array(rows, dtype=np.float64))
+                rows.clear()
     except csv.Error as error:
         raise RecordingError(f"{path}, line {line + reader.line_num - 1}: cannot be read: {error}") from error
-    if not rows:
-        raise RecordingError(f"{path}: a header, but no rows of numbers")
-    return np.array(rows, dtype=np.float64)
+    if rows:
+        blocks.append(np.array(rows, dtype=np.float64))
+    return np.concatenate(blocks)
 
 
 def _ragged(cells: list[str], header: list[str], where: str) -> str:

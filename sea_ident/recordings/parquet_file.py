@@ -36,7 +36,7 @@ def read_parquet(path: Path, names: Collection[str] | None, memory_limit: int) -
         raise MissingExtraError("pyarrow", "parquet", f"{path}: reading Parquet") from error
     left_out: list[str] = []
     columns: dict[str, FloatArray] = {}
-    with parquet.ParquetFile(path, memory_map=False) as file:
+    with parquet.ParquetFile(path, page_checksum_verification=True) as file:
         schema = file.schema_arrow
         if len(schema) > MOST_COLUMNS:
             raise RecordingError(f"{path}: {len(schema)} columns; at most {MOST_COLUMNS} are read")
@@ -73,7 +73,7 @@ def write_parquet(recording: Recording, path: Path) -> None:
     except ImportError as error:
         raise MissingExtraError("pyarrow", "parquet", f"{path}: writing Parquet") from error
     table = pyarrow.table({TIME: recording.time, **recording.columns})
-    parquet.write_table(table, path)
+    parquet.write_table(table, path, write_page_checksum=True)
 
 
 def _seconds(kind: Any) -> float | None:

@@ -19,6 +19,12 @@ EVEN_SPACING_TOLERANCE = 0.05
 GAP_FACTOR = 3.0
 """An interval longer than this many median intervals is reported as a gap."""
 
+SHORTEST_INTERVAL = 1e-9
+"""A median interval below this [s] is refused."""
+
+WRAP_TOLERANCE = 0.3
+"""A step of an angle this close to a whole turn [rad] is reported, where most steps are below this."""
+
 LARGEST_VALUE = 1e12
 """A time or a known quantity beyond this in SI units is refused: it is corrupt or in another unit."""
 
@@ -143,7 +149,7 @@ class Recording:
                 f"start {start} s and stop {stop} s; the recording runs from {self.time[0]:g} s to {self.time[-1]:g} s"
             )
         columns = {name: values[first:last] for name, values in self.columns.items()}
-        return Recording(self.time[first:last], columns, self.source, self.warnings, self.notes)
+        return Recording(self.time[first:last], columns, self.source, self._given_warnings(), self.notes)
 
     def replace_columns(self, columns: Mapping[str, ArrayLike]) -> "Recording":
         """A copy in which the given columns, shape (N,) each, replace those of the same name or are added.
@@ -152,7 +158,7 @@ class Recording:
             RecordingError: as on construction.
         """
         arrays = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
-        return Recording(self.time, {**self.columns, **arrays}, self.source, self.warnings, self.notes)
+        return Recording(self.time, {**self.columns, **arrays}, self.source, self._given_warnings(), self.notes)
 
     def summary(self) -> str:
         """Text for people: extent, joints, range of every column, warnings and notes."""
@@ -170,6 +176,11 @@ class Recording:
         lines += [f"  warning: {text}" for text in self.warnings]
         lines += [f"  note: {text}" for text in self.notes]
         return "\n".join(lines)
+
+    def _given_warnings(self) -> tuple[str, ...]:
+        """The warnings without those found in the data, which a changed copy finds anew."""
+        found = _warnings(self.time, self.columns, self.source)
+        return tuple(text for text in self.warnings if text not in found)
 
     def _absent(self, name: str, joint: str) -> str:
         near = get_close_matches(name, self.columns, n=1, cutoff=0.8)
@@ -234,6 +245,9 @@ def _check_time(time: FloatArray, source: str) -> None:
             f"It must rise strictly; {falls.size} of {time.size - 1} steps do not ({equal} repeat a time). "
             "Remove repeated rows, write time with more digits, or split a log that was restarted"
         )
+    interval = float(np.median(np.diff(time)))
+    if interval < SHORTEST_INTERVAL:
+        raise RecordingError(f"{source}: the median interval of time is {interval:g} s; is time in seconds?")
 
 
 def _check_column(values: FloatArray, name: str, time: FloatArray, source: str) -> None:
@@ -251,6 +265,17 @@ def _check_column(values: FloatArray, name: str, time: FloatArray, source: str) 
 
 def _warnings(time: FloatArray, columns: Mapping[str, FloatArray], source: str) -> list[str]:
     found = []
+    for name, values in columns.items():
+        parts = split_name(name)
+        if parts is not None and parts[0] in ("q", "theta"):
+            steps = np.abs(np.diff(values))
+            jumps = np.flatnonzero(np.abs(steps - 2.0 * np.pi) < WRAP_TOLERANCE)
+            if jumps.size and float(np.median(steps)) < WRAP_TOLERANCE:
+                k = int(jumps[0])
+                found.append(
+                    f"{source}: column {name} jumps by a whole turn after sample {k} (time {time[k]:g} s), and "
+                    f"{jumps.size} times in all; if the sensor wraps around, say ColumnSource(..., wraps_at=...)"
+                )
     unknown = [name for name in columns if split_name(name) is None]
     if unknown:
         found.append(
