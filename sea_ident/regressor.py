@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects import Column, Effect, State
+from sea_ident.effects import Column, Contribution, Effect, State, corrected_motion
 from sea_ident.exceptions import SeaIdentError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -86,15 +86,17 @@ def build_regressor(
     """
     if motion.n != robot.n:
         raise SeaIdentError(f"the motion has {motion.n} joints, {robot.name} has {robot.n}")
-    state = State(robot, motion, channels)
+    state = State(robot, corrected_motion(robot, effects, motion), channels)
     columns = model_columns(robot, effects)
     parts = [effect.evaluate(state) for effect in effects]
     empty = np.zeros((len(motion), robot.n, 0))
-    return Regressor(
-        columns,
+    rows = Contribution(
         np.concatenate([empty, *(part.link for part in parts)], axis=2),
         np.concatenate([empty, *(part.motor for part in parts)], axis=2),
     )
+    for effect in effects:
+        rows = effect.shifted(robot, motion.time, rows)
+    return Regressor(columns, rows.link, rows.motor)
 
 
 def regressor_chunks(robot: Robot, effects: Sequence[Effect], motion: Motion, size: int = 1000) -> Iterator[Regressor]:

@@ -1,11 +1,10 @@
 """Inertia and gravity of the links."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Contribution, Effect, Side, SimulationState, State
+from sea_ident.effects.base import Action, Column, Contribution, Effect, Side, State
 from sea_ident.robot import INERTIAL_UNITS, Robot
 
 
@@ -47,6 +46,6 @@ class RigidBodies(Effect):
         """The URDF's own inertials."""
         return robot.inertial_parameters
 
-    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
         """Nothing to add: the simulator integrates the bodies themselves."""
         return lambda state, link, motor: None

@@ -1,13 +1,12 @@
 """Inertia of the rotors about their spin axes."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Contribution, Effect, Side, SimulationState, State
+from sea_ident.effects.base import Action, Column, Contribution, Effect, Side, State
 from sea_ident.robot import Robot
 
 
@@ -49,7 +48,7 @@ class RotorInertia(Effect):
                 values[groups.index(f"{rotor.rotor_group}.rotor_inertia")] = rotor.rotor_inertia
         return values
 
-    def torque(self, robot: Robot, values: FloatArray) -> Callable[[SimulationState, FloatArray, FloatArray], None]:
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
         """Nothing to add: the simulator integrates the rotors themselves."""
         return lambda state, link, motor: None
 

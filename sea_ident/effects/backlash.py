@@ -1,0 +1,38 @@
+"""Play in series with the spring."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Column, Shape
+from sea_ident.effects.spring import SpringEffect
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class Backlash(SpringEffect):
+    """-K clip(theta - q, -w, w): within the play the spring carries nothing.
+
+    K is the stiffness of the spring; it is fitted on its own.
+
+    Attributes:
+        joint: joint at which it acts.
+        half_width: w [rad] or [m].
+    """
+
+    half_width: float = 0.003
+
+    name: ClassVar[str] = "backlash"
+    source: ClassVar[str] = "Nordin, Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("half_width", "rad", 2e-4, 0.05, points=8),)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """One column."""
+        torque, position = self.units_of(robot)
+        return (Column(self.parameter_name(), f"{torque}/{position}", self.name, self.joint, self.side, True),)
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """-clip(theta - q, -w, w)."""
+        return -np.clip(theta - q, -self.half_width, self.half_width)[:, None]

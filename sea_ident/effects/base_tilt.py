@@ -1,0 +1,89 @@
+"""A base that does not stand level."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Action, Anchor, Column, Contribution, Effect, Side, State
+from sea_ident.motion import Motion
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class BaseTilt(Effect):
+    """Gravity in another direction than the description says, for small angles.
+
+    Attributes:
+        joint: None, it acts on the whole robot.
+        inertial: (10 b,) standard inertial parameters of all links; empty for those of the description.
+    """
+
+    inertial: Sequence[float] = ()
+
+    name: ClassVar[str] = "base_tilt"
+    side: ClassVar[Side] = Side.LINK
+    source: ClassVar[str] = "Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, section 9.3"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inertial", tuple(float(value) for value in self.inertial))
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
+        """Once for the whole robot, if there is gravity."""
+        return (cls(),) if np.any(robot.model.gravity.linear) else ()
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Rotation of the base about two level axes."""
+        return tuple(
+            Column(self.parameter_name(label), "rad", self.name, None, self.side) for label in ("first", "second")
+        )
+
+    def evaluate(self, state: State) -> Contribution:
+        """Torque of the change of gravity for an angle of one."""
+        inertial = np.array(self.inertial) if len(self.inertial) else state.robot.inertial_parameters
+        still = np.zeros_like(state.motion.q)
+        motion = state.motion
+        held = Motion(motion.time, motion.q, still, still, motion.theta, still, still)
+        link, motor = [], []
+        gravity = np.asarray(state.robot.model.gravity.linear)
+        for axis in level_axes(gravity):
+            rows = State(with_gravity(state.robot, np.cross(axis, gravity)), held).body_rows(inertial)
+            # the base turns by an angle, so gravity turns the other way as the robot sees it
+            link.append(-rows.link)
+            motor.append(-rows.motor)
+        return Contribution(np.concatenate(link, axis=2), np.concatenate(motor, axis=2))
+
+    def anchored(self, anchor: Anchor) -> "BaseTilt":
+        """With the inertial parameters of the model."""
+        return replace(self, inertial=anchor.inertial())
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """None: it acts in `modified`."""
+        return lambda state, link, motor: None
+
+    def modified(self, robot: Robot, values: FloatArray) -> Robot:
+        """The robot with its gravity turned."""
+        gravity = np.asarray(robot.model.gravity.linear)
+        turn = sum((value * axis for value, axis in zip(values, level_axes(gravity), strict=True)), np.zeros(3))
+        return with_gravity(robot, pin.exp3(-turn) @ gravity)
+
+
+def level_axes(gravity: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two axes at right angles to gravity: those of the base where it stands level."""
+    down = gravity / np.linalg.norm(gravity)
+    start = np.eye(3)[int(np.argmin(np.abs(down)))]
+    first = start - (start @ down) * down
+    first /= np.linalg.norm(first)
+    return first, np.cross(-down, first)
+
+
+def with_gravity(robot: Robot, gravity: FloatArray) -> Robot:
+    """The same robot under another gravity (3,) [m/s2]."""
+    model, extended = pin.Model(robot.model), pin.Model(robot.extended_model)
+    model.gravity = pin.Motion(np.asarray(gravity), np.zeros(3))
+    extended.gravity = pin.Motion(np.asarray(gravity), np.zeros(3))
+    return replace(robot, model=model, extended_model=extended)

@@ -1,0 +1,58 @@
+"""Effects that change in the course of a recording."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Action, Contribution, JointEffect, Shape, SimulationState, State
+from sea_ident.robot import Robot
+
+_MINUTE = 60.0
+
+
+def warming(time: FloatArray, time_constant: float) -> FloatArray:
+    """Change at the times (any shape) [s] that starts at a rate of one per minute and ends with a time constant.
+
+    With a time constant far longer than the recording it is linear in time.
+    """
+    amount: FloatArray = -time_constant * np.expm1(-time / time_constant) / _MINUTE
+    return amount
+
+
+@dataclass(frozen=True)
+class DriftEffect(JointEffect):
+    """Columns of a joint, as `local_columns` gives them, times a change in time.
+
+    The time of the motion is that of the recording: the columns of one mean period show next to nothing, and the
+    comparison of the periods shows it all.
+
+    Attributes:
+        joint: joint at which it acts.
+        time_constant: of the drift [s].
+    """
+
+    time_constant: float = 1e4
+
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 20.0, 1e4, points=4),)
+
+    def evaluate(self, state: State) -> Contribution:
+        """Columns times the drift."""
+        rows = super().evaluate(state)
+        change = warming(state.motion.time, self.time_constant)[:, None, None]
+        return Contribution(rows.link * change, rows.motor * change)
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """The columns at the present state and time, times the values."""
+        steady = super().torque(robot, values)
+        scratch = np.zeros((2, robot.n))
+
+        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+            scratch[:] = 0.0
+            steady(state, scratch[0], scratch[1])
+            change = float(warming(np.array(state.time), self.time_constant))
+            link += change * scratch[0]
+            motor += change * scratch[1]
+
+        return act

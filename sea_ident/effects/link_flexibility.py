@@ -1,0 +1,91 @@
+"""A link that bends behind its encoder."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Anchor, Effect, Shape
+from sea_ident.effects.signal import SignalEffect, with_joint
+from sea_ident.exceptions import EffectError
+from sea_ident.motion import Motion
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class LinkFlexibility(SignalEffect):
+    """The bodies stand at q - c tau_spring, where q is what the link encoder shows.
+
+    The compliance bends without inertia of its own. The spring then shows what is between motor and bodies.
+
+    Attributes:
+        joint: joint at which it acts.
+        compliance: c, behind the encoder [rad/(N m)].
+        stiffness: K1 of the spring up to the encoder, None for that of the description [N m/rad].
+        cubic_stiffness: K3 of it [N m/rad3].
+    """
+
+    compliance: float = 0.0
+    stiffness: float | None = None
+    cubic_stiffness: float | None = None
+
+    name: ClassVar[str] = "link_flexibility"
+    source: ClassVar[str] = "Wernholt, Moberg, Nonlinear gray-box identification using local models, Automatica 2011"
+    amounts: ClassVar[tuple[Shape, ...]] = (Shape("compliance", "rad/(N m)", 0.0, 0.01, logarithmic=False),)
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
+        """At every elastic joint."""
+        return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
+
+    def anchored(self, anchor: Anchor) -> "LinkFlexibility":
+        """With the spring of the model: it is the whole of both compliances, of which this is the part before q."""
+        if self.stiffness is not None:
+            return self
+        return replace(
+            self,
+            stiffness=anchor.value(f"{self.joint}.spring_stiffness"),
+            cubic_stiffness=anchor.value(f"{self.joint}.spring_stiffening"),
+        )
+
+    def corrected(self, robot: Robot, motion: Motion) -> Motion:
+        """Q of the bodies."""
+        i = self.required_index(robot)
+        linear, cubic = self._spring(robot)
+        d, dd = motion.deflection[:, i], motion.deflection_rate[:, i]
+        ddd = motion.ddtheta[:, i] - motion.ddq[:, i]
+        slope = linear + 3.0 * cubic * d**2
+        c = self.compliance
+        return with_joint(
+            robot,
+            motion,
+            i,
+            motion.q[:, i] - c * (linear * d + cubic * d**3),
+            motion.dq[:, i] - c * slope * dd,
+            motion.ddq[:, i] - c * (slope * ddd + 6.0 * cubic * d * dd**2),
+        )
+
+    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Q where the encoder sits, between the two compliances.
+
+        Raises:
+            EffectError: if the signals do not hold the spring torque.
+        """
+        i = self.required_index(robot)
+        if "tau_spring" not in signals:
+            raise EffectError(f"the effect {self.name!r} needs the spring torque of the simulation, tau_spring")
+        out = dict(signals)
+        out["q"] = signals["q"].copy()
+        out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]
+        return out
+
+    def _spring(self, robot: Robot) -> tuple[float, float]:
+        spring = robot.spring(str(self.joint))
+        linear = self.stiffness if self.stiffness is not None else spring.stiffness
+        if linear is None:
+            raise EffectError(
+                f"the effect {self.name!r} at {self.joint!r} needs the stiffness of its spring: give stiffness=..., "
+                "or put it into the annotation"
+            )
+        cubic = self.cubic_stiffness if self.cubic_stiffness is not None else spring.cubic_stiffness
+        return linear, cubic or 0.0

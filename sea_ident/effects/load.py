@@ -1,0 +1,157 @@
+"""Effects that depend on the torque that a joint carries."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import (
+    Action,
+    Anchor,
+    Contribution,
+    Effect,
+    Side,
+    SimulationState,
+    State,
+    smooth_sign,
+)
+from sea_ident.exceptions import EffectError
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class LoadEffect(Effect):
+    """An effect whose columns depend on the load of its joint.
+
+    The load is not measured: it is what the rest of the model says, and is kept in the effect itself (`anchored`), so
+    that a model that is saved and read again has the same columns. What is None comes from the robot's description.
+
+    Attributes:
+        joint: joint at which it acts.
+        smoothing: speed around which the sign of the velocity is smoothed [rad/s] or [m/s].
+        stiffness: K1 of its spring [N m/rad].
+        cubic_stiffness: K3 of its spring [N m/rad3].
+        damping: D of its spring [N m s/rad].
+        reflected_inertia: of its motor [kg m2].
+        viscous: friction of its motor [N m s/rad].
+        coulomb: friction of its motor [N m].
+        inertial: (10 b,) standard inertial parameters of all links, for the load of a rigid joint.
+    """
+
+    smoothing: float = 0.01
+    stiffness: float | None = None
+    cubic_stiffness: float | None = None
+    damping: float | None = None
+    reflected_inertia: float | None = None
+    viscous: float | None = None
+    coulomb: float | None = None
+    inertial: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inertial", tuple(float(value) for value in self.inertial))
+
+    @property
+    def at(self) -> str:
+        """The joint.
+
+        Raises:
+            EffectError: if none was given.
+        """
+        if self.joint is None:
+            raise EffectError(f"the effect {self.name!r} acts at a joint; give joint=...")
+        return self.joint
+
+    def anchored(self, anchor: Anchor) -> Self:
+        """The same effect with the load that the model gives to its joint."""
+        robot, joint = anchor.robot, self.at
+        known = robot.joints[robot.index(joint)]
+        smoothing = anchor.smoothing(joint)
+        changed = replace(
+            self,
+            smoothing=self.smoothing if smoothing is None else smoothing,
+            viscous=anchor.value(f"{joint}.viscous_friction"),
+            coulomb=anchor.value(f"{joint}.coulomb_friction"),
+            reflected_inertia=_reflected_inertia(robot, joint, anchor),
+        )
+        if known.elastic:
+            return replace(
+                changed,
+                stiffness=anchor.value(f"{joint}.spring_stiffness"),
+                cubic_stiffness=anchor.value(f"{joint}.spring_stiffening"),
+                damping=anchor.value(f"{joint}.spring_damping"),
+            )
+        return replace(changed, inertial=anchor.inertial())
+
+    def spring_load(self, robot: Robot, deflection: FloatArray, rate: FloatArray) -> FloatArray:
+        """Torque of the spring [N m] at deflections [rad] and deflection rates [rad/s] of any shape.
+
+        Raises:
+            EffectError: if its stiffness is known neither from a fit nor from the robot's description.
+        """
+        spring = robot.spring(self.at)
+        stiffness = self.stiffness if self.stiffness is not None else spring.stiffness
+        if stiffness is None:
+            raise EffectError(
+                f"the effect {self.name!r} at {self.at!r} depends on the load, and the stiffness of its spring is not "
+                "known: give stiffness=..., or put it into the annotation"
+            )
+        cubic = self.cubic_stiffness if self.cubic_stiffness is not None else spring.cubic_stiffness
+        damping = self.damping if self.damping is not None else spring.damping
+        return stiffness * deflection + (cubic or 0.0) * deflection**3 + (damping or 0.0) * rate
+
+    def load(self, state: State) -> FloatArray:
+        """(N,) torque from the motor side onto the link [N m]: of the spring, or at a rigid joint of the bodies."""
+        robot, i = state.robot, state.robot.index(self.at)
+        if robot.joints[i].elastic:
+            return self.spring_load(robot, state.motion.deflection[:, i], state.motion.deflection_rate[:, i])
+        return state.body_torque(np.array(self.inertial) if len(self.inertial) else robot.inertial_parameters)[:, i]
+
+    def motor_torque(self, state: State) -> FloatArray:
+        """(N,) torque of the motor: load, inertia of the rotor, friction [N m]."""
+        robot, motion = state.robot, state.motion
+        i = robot.index(self.at)
+        actuator = robot.joints[i].actuator
+        inertia, viscous, coulomb = self.reflected_inertia, self.viscous, self.coulomb
+        if actuator is not None:
+            inertia = (actuator.rotor_inertia or 0.0) * actuator.gear_ratio**2 if inertia is None else inertia
+            viscous = actuator.viscous_friction if viscous is None else viscous
+            coulomb = actuator.coulomb_friction if coulomb is None else coulomb
+        friction = (viscous or 0.0) * motion.dtheta[:, i] + (coulomb or 0.0) * self.sign(motion.dtheta[:, i])
+        torque: FloatArray = self.load(state) + (inertia or 0.0) * motion.ddtheta[:, i] + friction
+        return torque
+
+    def sign(self, velocity: FloatArray) -> FloatArray:
+        """Smoothed sign of a velocity."""
+        return smooth_sign(velocity, self.smoothing)
+
+
+def _reflected_inertia(robot: Robot, joint: str, anchor: Anchor) -> float:
+    actuator = robot.joints[robot.index(joint)].actuator
+    if actuator is None:
+        return 0.0
+    return anchor.value(f"{actuator.rotor_group}.rotor_inertia") * actuator.gear_ratio**2
+
+
+class MotorLoadEffect(LoadEffect):
+    """An effect at the motor, given by the load of the joint and the speed of the motor."""
+
+    @abstractmethod
+    def column_of(self, load: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N, 1) column from the load (N,) [N m] and the motor velocity (N,)."""
+
+    def evaluate(self, state: State) -> Contribution:
+        """Motor row (N, n, 1)."""
+        i = state.robot.index(self.at)
+        return state.at(Side.MOTOR, self.at, self.column_of(self.load(state), state.motion.dtheta[:, i]))
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """The same at the present state, with the torque that the simulator has for the joint."""
+        i = robot.index(self.at)
+
+        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+            motor[i] += float(self.column_of(state.tau_spring[i : i + 1], state.dtheta[i : i + 1])[0] @ values)
+
+        return act

@@ -1,0 +1,96 @@
+"""Effects with memory: what they do depends on the path, not only on the present state."""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Action, JointEffect, Side, SimulationState
+from sea_ident.effects.signal import is_closed
+from sea_ident.robot import Robot
+
+
+class MemoryEffect(JointEffect):
+    """An effect at a single joint whose columns depend on the path of that joint.
+
+    The memory is a tuple of numbers that moves on with the distance travelled, so that it does not depend on the
+    rate of the samples. Over one period of a periodic motion it is evaluated twice around: the second time it is in
+    its steady state.
+    """
+
+    memory_size: ClassVar[int] = 1
+
+    @abstractmethod
+    def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """(N,) coordinate that drives the memory: theta for friction, theta - q for a spring."""
+
+    @abstractmethod
+    def advance(self, memory: tuple[float, ...], distance: float) -> tuple[float, ...]:
+        """Memory after travelling a distance."""
+
+    @abstractmethod
+    def remembered_columns(self, memory: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N, k) columns from the memory (N, m) and the motor velocity (N,)."""
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N, k) columns; a closed path is in its steady state, any other starts without memory."""
+        path = self.path(q, theta)
+        memory: tuple[float, ...] = (0.0,) * self.memory_size
+        if is_closed(path):
+            steps = np.diff(path, prepend=path[-1]).tolist()
+            for distance in steps:
+                memory = self.advance(memory, distance)
+        else:
+            steps = np.diff(path, prepend=path[0]).tolist()
+        trace = np.empty((len(steps), self.memory_size))
+        for k, distance in enumerate(steps):
+            memory = self.advance(memory, distance)
+            trace[k] = memory
+        return self.remembered_columns(trace, dtheta)
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """An action that keeps its memory; the simulator tells it by `accept` which states count."""
+        return MemoryAction(self, robot.index(self.required_joint), np.asarray(values, dtype=np.float64))
+
+
+class MemoryAction:
+    """A `MemoryEffect` at work in a simulation.
+
+    Attributes:
+        effect: the effect.
+        index: index of its joint.
+        values: (k,) values of its parameters.
+    """
+
+    def __init__(self, effect: MemoryEffect, index: int, values: FloatArray) -> None:
+        self.effect, self.index, self.values = effect, index, values
+        self._memory: tuple[float, ...] = (0.0,) * effect.memory_size
+        self._position: float | None = None
+
+    def _path(self, state: SimulationState) -> float:
+        i = self.index
+        return float(self.effect.path(state.q[i : i + 1], state.theta[i : i + 1])[0])
+
+    def _at(self, position: float) -> tuple[float, ...]:
+        if self._position is None:
+            self._position = position
+        return self.effect.advance(self._memory, position - self._position)
+
+    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+        """Add the torque of a trial state."""
+        i = self.index
+        memory = np.array([self._at(self._path(state))])
+        amount = float(self.effect.remembered_columns(memory, state.dtheta[i : i + 1])[0] @ self.values)
+        if self.effect.side is Side.LINK:
+            link[i] += amount
+        else:
+            motor[i] += amount
+        if self.effect.side is Side.SPRING:
+            link[i] -= amount
+
+    def accept(self, state: SimulationState) -> None:
+        """Move the memory on to a state that is kept."""
+        position = self._path(state)
+        self._memory = self._at(position)
+        self._position = position

@@ -1,0 +1,38 @@
+"""Orders of what repeats over the turn of a joint."""
+
+import numpy as np
+
+from sea_ident.effects.base import State
+
+_GEAR_MULTIPLES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
+
+
+def orders(state: State, joint: str, most: int) -> tuple[float, ...]:
+    """Orders n of sin(n theta) that a search should try on a motion.
+
+    Two orders closer than about 2 over the range of theta look alike. Orders so high that the motion passes them
+    faster than four samples a period are left out. Multiples of the gear ratio (turns of the motor) are always among
+    them where they are slow enough.
+
+    Args:
+        state: robot and motion.
+        joint: the joint.
+        most: largest number of orders in the even grid.
+
+    Returns:
+        Rising orders, at least one [1/rad] or [1/m].
+    """
+    robot, motion = state.robot, state.motion
+    i = robot.index(joint)
+    theta, speed = motion.theta[:, i], np.abs(motion.dtheta[:, i])
+    span = max(float(np.ptp(theta)), 1e-9)
+    step = float(motion.time[-1] - motion.time[0]) / max(len(motion) - 1, 1)
+    fastest = max(float(np.quantile(speed, 0.9)), 1e-9)
+    highest = 2.0 * np.pi / (4.0 * step * fastest)
+    spacing = 2.0 / span
+    lowest = min(1.0, spacing) if not robot.joints[i].prismatic else spacing
+    grid = lowest + spacing * np.arange(most)
+    gear = float(robot.gear_ratios[i]) * np.array(_GEAR_MULTIPLES) if robot.gear_ratios[i] > 1.0 else np.zeros(0)
+    found = np.unique(np.concatenate([grid, gear]))
+    found = found[found <= highest]
+    return tuple(float(order) for order in found) if len(found) else (float(lowest),)

@@ -1,0 +1,51 @@
+"""Friction that varies over the turn: a bent shaft, a worn tooth."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Anchor, Column, JointEffect, Shape, Side, State, smooth_sign
+from sea_ident.effects.orders import orders
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class PositionDependentFriction(JointEffect):
+    """sgn(theta') (a sin(n theta) + b cos(n theta)) at the motor.
+
+    Attributes:
+        joint: joint at which it acts.
+        order: n, periods per turn of the joint [-].
+        smoothing: speed around which the sign is smoothed [rad/s] or [m/s].
+    """
+
+    order: float = 1.0
+    smoothing: float = 0.01
+
+    name: ClassVar[str] = "position_dependent_friction"
+    side: ClassVar[Side] = Side.MOTOR
+    source: ClassVar[str] = "Armstrong-Helouvry, Control of Machines with Friction, 1991"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 2000.0),)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Sine and cosine."""
+        torque, _ = self.units_of(robot)
+        return tuple(
+            Column(self.parameter_name(label), torque, self.name, self.joint, self.side) for label in ("sine", "cosine")
+        )
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """Sine and cosine of n theta, times the sign of the velocity."""
+        waves = np.stack([np.sin(self.order * theta), np.cos(self.order * theta)], axis=1)
+        columns: FloatArray = smooth_sign(dtheta, self.smoothing)[:, None] * waves
+        return columns
+
+    def variants(self, state: State) -> tuple["PositionDependentFriction", ...]:
+        """Low orders that this motion tells apart, and those of the gear."""
+        return tuple(replace(self, order=order) for order in orders(state, self.required_joint, 40))
+
+    def anchored(self, anchor: Anchor) -> "PositionDependentFriction":
+        """With the smoothing of the model's Coulomb friction."""
+        return replace(self, smoothing=anchor.smoothing(self.required_joint) or self.smoothing)

@@ -1,0 +1,109 @@
+"""Effects in the chain of signals: encoders that err, signals that come late."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Action, Column, Contribution, Effect, Shape, Side, State
+from sea_ident.exceptions import EffectError
+from sea_ident.motion import Motion
+from sea_ident.robot import Robot
+
+
+class SignalEffect(Effect):
+    """An effect in a sensor or on the way of a signal.
+
+    It adds no torque and so no column. It says how to get from the signal as recorded to the signal as it was, and
+    its amounts enter the model through all other columns. Both directions exist: `corrected` and `shifted` for a
+    model, `measured` for a simulation.
+
+    A search uses the derivative of the model torque with respect to its amounts.
+    """
+
+    side: ClassVar[Side] = Side.SENSOR
+    amounts: ClassVar[tuple[Shape, ...]]
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """None: its amounts are attributes."""
+        self.required_index(robot)
+        return ()
+
+    def evaluate(self, state: State) -> Contribution:
+        """No columns."""
+        empty = np.zeros((len(state.motion), state.robot.n, 0))
+        return Contribution(empty, empty)
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """None: it acts in `measured`."""
+        return lambda state, link, motor: None
+
+    @abstractmethod
+    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """The signals (N, n) as recorded, from the true ones."""
+
+    @property
+    def amount_values(self) -> dict[str, float]:
+        """Values of its amounts."""
+        return {amount.name: float(getattr(self, amount.name)) for amount in self.amounts}
+
+    def required_index(self, robot: Robot) -> int:
+        """Index of its joint.
+
+        Raises:
+            EffectError: if none was given.
+        """
+        if self.joint is None:
+            raise EffectError(f"the effect {self.name!r} acts at a joint; give joint=...")
+        return robot.index(self.joint)
+
+
+def is_closed(values: FloatArray) -> bool:
+    """Whether samples (N,) or (N, n) of one uniform period close on themselves."""
+    if len(values) < 8:
+        return False
+    bend = np.abs(np.diff(values, n=2, axis=0)).max(axis=0)
+    gap = np.abs(values[0] - (2.0 * values[-1] - values[-2]))
+    return bool(np.all(gap <= 3.0 * bend + 1e-12))
+
+
+def ahead(time: FloatArray, values: FloatArray, by: float) -> FloatArray:
+    """Values (N, ...) at ``time + by`` from values at the uniform times (N,) [s].
+
+    A closed period is shifted round, exactly as a Fourier series; any other signal is interpolated by a cubic spline
+    and held at its ends.
+    """
+    if by == 0.0:
+        return values
+    if is_closed(values.reshape(len(values), -1)):
+        step = float(time[-1] - time[0]) / (len(time) - 1)
+        spectrum = np.fft.rfft(values, axis=0)
+        phase = np.exp(2j * np.pi * np.fft.rfftfreq(len(time), step) * by)
+        turned = spectrum * phase.reshape(-1, *([1] * (values.ndim - 1)))
+        return np.asarray(np.fft.irfft(turned, n=len(time), axis=0), dtype=np.float64)
+    spline = CubicSpline(time, values, axis=0)
+    return np.asarray(spline(np.clip(time + by, time[0], time[-1])), dtype=np.float64)
+
+
+def with_joint(robot: Robot, motion: Motion, joint: int, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Motion:
+    """The motion with other link samples (N,) of one joint; where it is rigid, the motor follows."""
+    new = {
+        "q": _replaced(motion.q, joint, q),
+        "dq": _replaced(motion.dq, joint, dq),
+        "ddq": _replaced(motion.ddq, joint, ddq),
+    }
+    if robot.joints[joint].elastic:
+        return Motion(motion.time, new["q"], new["dq"], new["ddq"], motion.theta, motion.dtheta, motion.ddtheta)
+    return Motion(
+        motion.time, new["q"], new["dq"], new["ddq"],
+        _replaced(motion.theta, joint, q), _replaced(motion.dtheta, joint, dq), _replaced(motion.ddtheta, joint, ddq),
+    )  # fmt: skip
+
+
+def _replaced(values: FloatArray, column: int, new: FloatArray) -> FloatArray:
+    out = values.copy()
+    out[:, column] = new
+    return out

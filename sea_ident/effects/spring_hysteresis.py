@@ -1,0 +1,58 @@
+"""Dry friction inside the spring: loading and unloading take two ways."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Column, Shape, Side
+from sea_ident.effects.memory import MemoryEffect
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class SpringHysteresis(MemoryEffect):
+    """c_1 z_1 + c_2 z_2 in the spring: two Maxwell-slip elements that slip at w and at 3 w.
+
+    An element is a spring in series with dry friction; z goes from -1 to 1.
+
+    Attributes:
+        joint: joint at which it acts.
+        slip: w, deflection at which the first element slips [rad] or [m].
+    """
+
+    slip: float = 0.005
+
+    name: ClassVar[str] = "spring_hysteresis"
+    side: ClassVar[Side] = Side.SPRING
+    source: ClassVar[str] = "Iwan, A distributed-element model for hysteresis, J. Applied Mechanics 33, 1966"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("slip", "rad", 2e-4, 0.05, points=8),)
+    memory_size: ClassVar[int] = 2
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple["SpringHysteresis", ...]:
+        """At every elastic joint."""
+        return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """One column per element: the torque at which it slips."""
+        torque, _ = self.units_of(robot)
+        return tuple(
+            Column(self.parameter_name(label), torque, self.name, self.joint, self.side) for label in ("narrow", "wide")
+        )
+
+    def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Theta - q."""
+        return theta - q
+
+    def advance(self, memory: tuple[float, ...], distance: float) -> tuple[float, ...]:
+        """Both elements stick until they slip."""
+        step = distance / self.slip
+        narrow, wide = memory[0] + step, memory[1] + step / 3.0
+        return (
+            1.0 if narrow > 1.0 else -1.0 if narrow < -1.0 else narrow,
+            1.0 if wide > 1.0 else -1.0 if wide < -1.0 else wide,
+        )
+
+    def remembered_columns(self, memory: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """z_1, z_2."""
+        return memory

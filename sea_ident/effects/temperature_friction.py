@@ -1,0 +1,101 @@
+"""Friction that follows the measured temperature."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import (
+    Action,
+    Anchor,
+    Column,
+    Contribution,
+    JointEffect,
+    Side,
+    SimulationState,
+    State,
+    smooth_sign,
+)
+from sea_ident.exceptions import EffectError
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class TemperatureFriction(JointEffect):
+    """Viscous and Coulomb friction of the motor, times T - T_0.
+
+    Attributes:
+        joint: joint at which it acts.
+        reference: T_0 [degC].
+        rise: of the temperature in a simulation, where nothing else gives it [K].
+        time_constant: of that rise [s].
+        smoothing: speed around which the sign is smoothed [rad/s] or [m/s].
+    """
+
+    reference: float = 25.0
+    rise: float = 15.0
+    time_constant: float = 100.0
+    smoothing: float = 0.01
+
+    name: ClassVar[str] = "temperature_friction"
+    side: ClassVar[Side] = Side.MOTOR
+    source: ClassVar[str] = "Bittencourt, Gunnarsson, Static friction in a robot joint, ASME J. Dyn. Sys. 134, 2012"
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Change of the viscous and of the Coulomb friction per kelvin."""
+        torque, position = self.units_of(robot)
+        units = (f"{torque} s/{position}/K", f"{torque}/K")
+        return tuple(
+            Column(self.parameter_name(label), unit, self.name, self.joint, self.side)
+            for label, unit in zip(("viscous", "coulomb"), units, strict=True)
+        )
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """Columns for one kelvin."""
+        return np.stack([dtheta, smooth_sign(dtheta, self.smoothing)], axis=1)
+
+    def evaluate(self, state: State) -> Contribution:
+        """Columns times the measured temperature.
+
+        Raises:
+            EffectError: if the temperature was not measured.
+        """
+        if state.channels is None or "temperature" not in state.channels:
+            raise EffectError(f"the effect {self.name!r} needs the channel temperature_{self.joint} [degC]")
+        i = state.robot.index(self.required_joint)
+        above = state.channels["temperature"][:, i] - self.reference
+        rows = super().evaluate(state)
+        return Contribution(rows.link * above[:, None, None], rows.motor * above[:, None, None])
+
+    def anchored(self, anchor: Anchor) -> "TemperatureFriction":
+        """With the smoothing of the model's Coulomb friction."""
+        return replace(self, smoothing=anchor.smoothing(self.required_joint) or self.smoothing)
+
+    def temperature(self, time: FloatArray) -> FloatArray:
+        """Temperature in a simulation at the times (any shape) [degC]."""
+        value: FloatArray = self.reference - self.rise * np.expm1(-time / self.time_constant)
+        return value
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """With the temperature that rises as `rise` and `time_constant` say."""
+        steady = super().torque(robot, values)
+        scratch = np.zeros((2, robot.n))
+
+        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+            scratch[:] = 0.0
+            steady(state, scratch[0], scratch[1])
+            motor[:] += scratch[1] * (float(self.temperature(np.array(state.time))) - self.reference)
+
+        return act
+
+    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """A thermometer beside the other sensors."""
+        out = dict(signals)
+        temperature = (
+            out["temperature"].copy() if "temperature" in out else np.full((len(time), robot.n), self.reference)
+        )
+        temperature[:, robot.index(self.required_joint)] = self.temperature(time)
+        out["temperature"] = temperature
+        return out

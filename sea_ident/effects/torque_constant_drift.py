@@ -1,0 +1,51 @@
+"""A torque constant that changes in the course of the recording, as magnets warm."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Action, Column, Contribution, Shape, Side, SimulationState, State
+from sea_ident.effects.drift import warming
+from sea_ident.effects.load import LoadEffect
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class TorqueConstantDrift(LoadEffect):
+    """tau_m times the drift, in the motor row.
+
+    Attributes:
+        joint: joint at which it acts.
+        time_constant: of the drift [s].
+    """
+
+    time_constant: float = 1e4
+
+    name: ClassVar[str] = "torque_constant_drift"
+    side: ClassVar[Side] = Side.MOTOR
+    source: ClassVar[str] = (
+        "Sebastian, Temperature effects on torque production of PM motors, IEEE Trans. Ind. Appl. 1995"
+    )
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 20.0, 1e4, points=4),)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Initial relative rate of the torque that the record shows."""
+        robot.index(self.at)
+        return (Column(self.parameter_name(), "1/min", self.name, self.joint, self.side),)
+
+    def evaluate(self, state: State) -> Contribution:
+        """Motor torque times the drift."""
+        column = self.motor_torque(state) * warming(state.motion.time, self.time_constant)
+        return state.at(self.side, self.at, column[:, None])
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """The part of the commanded torque that is lost."""
+        i = robot.index(self.at)
+
+        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+            share = float(values[0]) * float(warming(np.array(state.time), self.time_constant))
+            motor[i] += state.tau_motor[i] * share / (1.0 + share)
+
+        return act

@@ -1,0 +1,45 @@
+"""A drive that gives its torque later than the record says."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Contribution, Shape
+from sea_ident.effects.signal import SignalEffect, ahead
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class TorqueDelay(SignalEffect):
+    """The torque recorded at t acts at t + delay.
+
+    Attributes:
+        joint: joint at which it acts.
+        delay: [s].
+    """
+
+    delay: float = 0.0
+
+    name: ClassVar[str] = "torque_delay"
+    source: ClassVar[str] = "Swevers, Verdonck, De Schutter, Dynamic model identification for industrial robots, 2007"
+    amounts: ClassVar[tuple[Shape, ...]] = (Shape("delay", "s", -0.05, 0.05, logarithmic=False),)
+
+    def shifted(self, robot: Robot, time: FloatArray, rows: Contribution) -> Contribution:
+        """The rows that give the torque of this motor, ahead of time."""
+        i = self.required_index(robot)
+        motor, link = rows.motor.copy(), rows.link
+        motor[:, i] = ahead(time, rows.motor[:, i], self.delay)
+        if not robot.joints[i].elastic:
+            link = rows.link.copy()
+            link[:, i] = ahead(time, rows.link[:, i], self.delay)
+        return Contribution(link, motor)
+
+    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """The torque as recorded."""
+        i = self.required_index(robot)
+        out = dict(signals)
+        if "tau_motor" in signals:
+            out["tau_motor"] = signals["tau_motor"].copy()
+            out["tau_motor"][:, i] = ahead(time, signals["tau_motor"][:, i], self.delay)
+        return out

@@ -1,0 +1,136 @@
+"""One motor that moves two joints: a belt, a cable or a wrist gear that passes another joint."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects.base import (
+    Action,
+    Anchor,
+    Column,
+    Contribution,
+    Effect,
+    Side,
+    SimulationState,
+    State,
+    smooth_sign,
+)
+from sea_ident.exceptions import EffectError
+from sea_ident.robot import Robot
+
+
+@dataclass(frozen=True)
+class TransmissionCoupling(Effect):
+    """The motor of `joint` turns by theta + r q of another joint: its inertia and friction couple the two.
+
+    Attributes:
+        joint: joint of the motor.
+        other: joint that its transmission passes.
+        reflected_inertia: of the motor, None for that of the description [kg m2].
+        viscous: friction of the motor [N m s/rad].
+        coulomb: friction of the motor [N m].
+        smoothing: speed around which the sign is smoothed [rad/s].
+    """
+
+    other: str | None = None
+    reflected_inertia: float | None = None
+    viscous: float | None = None
+    coulomb: float | None = None
+    smoothing: float = 0.01
+
+    name: ClassVar[str] = "transmission_coupling"
+    side: ClassVar[Side] = Side.BOTH
+    source: ClassVar[str] = "Staubli RX-90 wrist; Gautier, Dynamic identification of robots with power model, ICRA 1997"
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
+        """Every motor with the joint before it and the joint after it."""
+        names = robot.joint_names
+        pairs = [
+            (names[i], names[k])
+            for i in range(len(names))
+            for k in (i - 1, i + 1)
+            if 0 <= k < len(names) and robot.joints[i].actuator is not None
+        ]
+        return tuple(cls(joint=joint, other=other) for joint, other in pairs)
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """One column: the ratio r."""
+        self._indices(robot)
+        return (Column(self.parameter_name(f"from_{self.other}"), "-", self.name, self.joint, self.side),)
+
+    def evaluate(self, state: State) -> Contribution:
+        """First order in r: the motor feels the other link, and the other link feels the motor."""
+        i, k = self._indices(state.robot)
+        motion = state.motion
+        inertia, viscous, coulomb = self._motor(state.robot)
+        link, motor = (np.zeros((len(motion), state.robot.n, 1)) for _ in range(2))
+        sign = smooth_sign(motion.dtheta[:, i], self.smoothing)
+        slope = (1.0 - sign**2) / self.smoothing
+        motor[:, i, 0] = inertia * motion.ddq[:, k] + (viscous + coulomb * slope) * motion.dq[:, k]
+        link[:, k, 0] = inertia * motion.ddtheta[:, i] + viscous * motion.dtheta[:, i] + coulomb * sign
+        return Contribution(link, motor)
+
+    def anchored(self, anchor: Anchor) -> "TransmissionCoupling":
+        """With the inertia and the friction of the motor in the model."""
+        i, _ = self._indices(anchor.robot)
+        actuator = anchor.robot.joints[i].actuator
+        inertia = 0.0
+        if actuator is not None:
+            inertia = anchor.value(f"{actuator.rotor_group}.rotor_inertia") * actuator.gear_ratio**2
+        return replace(
+            self,
+            reflected_inertia=inertia,
+            viscous=anchor.value(f"{self.joint}.viscous_friction"),
+            coulomb=anchor.value(f"{self.joint}.coulomb_friction"),
+            smoothing=anchor.smoothing(str(self.joint)) or self.smoothing,
+        )
+
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """The friction; the inertia acts in `modified`."""
+        i, k = self._indices(robot)
+        _, viscous, coulomb = self._motor(robot)
+        ratio = float(values[0])
+
+        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+            own, turned = state.dtheta[i], state.dtheta[i] + ratio * state.dq[k]
+            friction = viscous * turned + coulomb * float(np.tanh(turned / self.smoothing))
+            motor[i] += friction - viscous * own - coulomb * float(np.tanh(own / self.smoothing))
+            link[k] += ratio * friction
+
+        return act
+
+    def modified(self, robot: Robot, values: FloatArray) -> Robot:
+        """The robot whose rotor turns with both joints."""
+        i, k = self._indices(robot)
+        link_map = robot.link_map.copy()
+        for index, rotor in zip(robot.rotor_indices, robot.rotors, strict=True):
+            if rotor.joint == self.joint:
+                row = robot.extended_model.joints[int(index)].idx_v
+                link_map[row, k] += float(values[0]) * (robot.motor_map[row, i] + robot.link_map[row, i])
+        return replace(robot, link_map=link_map)
+
+    def _motor(self, robot: Robot) -> tuple[float, float, float]:
+        actuator = robot.joints[self._indices(robot)[0]].actuator
+        known = (0.0, 0.0, 0.0)
+        if actuator is not None:
+            known = (
+                (actuator.rotor_inertia or 0.0) * actuator.gear_ratio**2,
+                actuator.viscous_friction or 0.0,
+                actuator.coulomb_friction or 0.0,
+            )
+        own = (self.reflected_inertia, self.viscous, self.coulomb)
+        inertia, viscous, coulomb = (a if b is None else b for a, b in zip(known, own, strict=True))
+        return inertia, viscous, coulomb
+
+    def _indices(self, robot: Robot) -> tuple[int, int]:
+        if self.joint is None or self.other is None:
+            raise EffectError(f"the effect {self.name!r} couples two joints; give joint=... and other=...")
+        if self.joint == self.other:
+            raise EffectError(f"the effect {self.name!r} couples joint {self.joint!r} with itself; give another one")
+        i, k = robot.index(self.joint), robot.index(self.other)
+        if robot.joints[i].actuator is None:
+            raise EffectError(f"joint {self.joint!r} of {robot.name} has no motor that could move another joint")
+        return i, k
