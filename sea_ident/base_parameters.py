@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Column, Effect
@@ -14,8 +15,9 @@ from sea_ident.motion import Motion
 from sea_ident.regressor import build_regressor, model_columns
 from sea_ident.robot import Robot
 
-# Among equally informative columns the pivoting should keep those that the literature names: first moments before
-# moments of inertia before masses. The factors only order the pivots; they are far from the rank decision.
+# A column that lies this close to the span of those kept before it (as a fraction of its length) adds nothing.
+_CLOSE = 1e-8
+# Weights of a pivoted choice: first moments before moments of inertia before masses.
 _PREFERENCE = {"m": 0.25, "Ixx": 0.5, "Ixy": 0.5, "Iyy": 0.4, "Ixz": 0.5, "Iyz": 0.5}
 
 
@@ -131,7 +133,10 @@ def find_base_parameters(
     seed: int = 0,
     tolerance: float = 1e-9,
 ) -> BaseParameters:
-    """Find the base parameters of a model: QR with column pivoting, with the singular values as the judge.
+    """Find the base parameters of a model: by orthogonalisation, with the singular values as the judge.
+
+    A parameter that depends on others is grouped into those of bodies nearer to the base, masses last; what a further
+    effect adds leaves the base parameters of the others as they are.
 
     Args:
         robot: the robot.
@@ -174,7 +179,7 @@ def group_columns(columns: tuple[Column, ...], triangle: FloatArray, tolerance: 
         SeaIdentError: if all columns are zero.
     """
     norms = np.linalg.norm(triangle, axis=0)
-    visible = norms > tolerance * max(float(norms.max(initial=0.0)), 1e-300)
+    visible = _visible(columns, norms, tolerance)
     if not np.any(visible):
         raise SeaIdentError("no parameter has any influence on the torque: the motion is at rest without gravity")
     scale = np.where(visible, norms, np.inf)
@@ -184,24 +189,20 @@ def group_columns(columns: tuple[Column, ...], triangle: FloatArray, tolerance: 
     singular_values[: len(found)] = found
     rank = int(np.count_nonzero(singular_values > tolerance * singular_values[0]))
 
-    preference = np.array([_PREFERENCE.get(column.name.rpartition(".")[2], 1.0) for column in columns])
-    _, upper, pivots = scipy.linalg.qr(normalised * preference, mode="economic", pivoting=True)
-    kept, rejected = pivots[:rank], pivots[rank:]
+    kept = _first_independent(columns, normalised, rank)
+    if kept is None:
+        kept = _pivoted(columns, normalised, rank)
+    rejected = np.setdiff1d(np.flatnonzero(visible), kept)
     # columns rejected = columns kept @ relation, in the units of the parameters
-    relation = scipy.linalg.solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
-    kept_scale = scale[kept] * 1.0 / preference[kept]
-    rejected_scale = np.where(visible[rejected], scale[rejected] / preference[rejected], 0.0)
-    relation = relation / kept_scale[:, None] * rejected_scale
-    # what is zero but for rounding, judged in the normalised columns
-    significance = np.abs(relation) * norms[kept][:, None]
-    relation[significance <= 1e-8 * np.maximum(norms[rejected], 1e-300)] = 0.0
-    order = np.argsort(kept)
+    orthogonal, upper = np.linalg.qr(normalised[:, kept])
+    relation = scipy.linalg.solve_triangular(upper, orthogonal.T @ normalised[:, rejected])
+    relation[np.abs(relation) < 1e-10] = 0.0  # rounding
     grouping = np.zeros((rank, len(columns)))
-    grouping[np.arange(rank), kept[order]] = 1.0
-    grouping[:, rejected] = relation[order]
+    grouping[np.arange(rank), kept] = 1.0
+    grouping[:, rejected] = relation / scale[kept][:, None] * scale[rejected]
 
     notes: list[str] = []
-    base = BaseParameters(columns, kept[order].astype(np.intp), grouping, singular_values, tolerance)
+    base = BaseParameters(columns, kept, grouping, singular_values, tolerance)
     if base.gap < 10.0:
         text = (
             f"the rank {rank} hangs on the tolerance: the singular values {singular_values[rank - 1]:.3g} and "
@@ -210,3 +211,48 @@ def group_columns(columns: tuple[Column, ...], triangle: FloatArray, tolerance: 
         python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
         notes.append(text)
     return BaseParameters(base.columns, base.independent, grouping, singular_values, tolerance, tuple(notes))
+
+
+def _visible(columns: tuple[Column, ...], norms: FloatArray, tolerance: float) -> NDArray[np.bool_]:
+    """(p,) which columns are not zero but for rounding, judged among columns of one effect and unit."""
+    largest: dict[tuple[str, str], float] = {}
+    for column, norm in zip(columns, norms, strict=True):
+        key = (column.effect, column.unit)
+        largest[key] = max(largest.get(key, 0.0), float(norm))
+    floor = 1e-13 * float(norms.max(initial=0.0))
+    limit = np.array([max(tolerance * largest[c.effect, c.unit], floor) for c in columns])
+    visible: NDArray[np.bool_] = (norms > limit) & (norms > 0.0)
+    return visible
+
+
+def _first_independent(columns: tuple[Column, ...], normalised: FloatArray, rank: int) -> IntArray | None:
+    """Indices of the first columns that do not depend on those before them; None if there are not `rank` of them.
+
+    Bodies come from the base to the tip, their masses last, then the other effects in their order. So a parameter is
+    grouped into those of bodies nearer to the base, the choice does not hang on the motion, and what an effect adds
+    leaves the base parameters before it as they are.
+    """
+    masses = [k for k, c in enumerate(columns) if c.effect == "rigid_bodies" and c.unit == "kg"]
+    bodies = [k for k, c in enumerate(columns) if c.effect == "rigid_bodies" and c.unit != "kg"]
+    others = [k for k, c in enumerate(columns) if c.effect != "rigid_bodies"]
+    basis = np.zeros((normalised.shape[0], rank), order="F")
+    kept: list[int] = []
+    for k in (*bodies, *masses, *others):
+        rest = normalised[:, k].copy()
+        for _ in range(2):  # once more, against rounding
+            rest -= basis[:, : len(kept)] @ (basis[:, : len(kept)].T @ rest)
+        distance = float(np.linalg.norm(rest))
+        if distance <= _CLOSE:
+            continue
+        if len(kept) == rank:
+            return None
+        basis[:, len(kept)] = rest / distance
+        kept.append(k)
+    return np.array(sorted(kept), dtype=np.intp) if len(kept) == rank else None
+
+
+def _pivoted(columns: tuple[Column, ...], normalised: FloatArray, rank: int) -> IntArray:
+    """Indices of the most independent columns, by QR with column pivoting: where the rank hangs on the tolerance."""
+    preference = np.array([_PREFERENCE.get(column.name.rpartition(".")[2], 1.0) for column in columns])
+    _, _, pivots = scipy.linalg.qr(normalised * preference, mode="economic", pivoting=True)
+    return np.sort(pivots[:rank]).astype(np.intp)
