@@ -10,8 +10,8 @@ from typing import Annotated, NoReturn
 import typer
 
 from sea_ident import __version__
-from sea_ident.cli.inspect_robot import inspect_robot
-from sea_ident.cli.output import note
+from sea_ident.cli.output import Interrupted, note
+from sea_ident.cli.verbs import VERBS
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 
 BAD_INPUT = 2
@@ -25,7 +25,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("inspect")(inspect_robot)
+for _verb in VERBS:
+    app.command(_verb.__name__)(_verb)
 
 
 def _print_version(wanted: bool) -> None:
@@ -46,17 +47,13 @@ def _describe(
     """
 
 
+def _interrupt(*_: object) -> NoReturn:
+    raise Interrupted
+
+
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
     if issubclass(category, SeaIdentWarning):
         note(f"warning: {message}")
-
-
-class _Interrupted(BaseException):
-    """Ctrl-C or a polite kill; unlike KeyboardInterrupt it passes through the parser untouched."""
-
-
-def _interrupt(*_: object) -> NoReturn:
-    raise _Interrupted
 
 
 def main() -> None:
@@ -71,7 +68,7 @@ def main() -> None:
     except SeaIdentError as error:
         note(f"error: {error}")
         sys.exit(BAD_INPUT)
-    except _Interrupted:
+    except Interrupted:
         note("interrupted; nothing half-written is left")
         sys.exit(INTERRUPTED)
     except BrokenPipeError:

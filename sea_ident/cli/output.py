@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,6 +11,26 @@ from pathlib import Path
 from typing import Any
 
 from sea_ident.exceptions import SeaIdentError
+
+
+class Interrupted(BaseException):
+    """Ctrl-C or a polite kill; unlike KeyboardInterrupt it passes through the parser of the command line untouched."""
+
+
+@contextmanager
+def best_so_far() -> Iterator[None]:
+    """Work that ends early with its best result on Ctrl-C, rather than with nothing.
+
+    Raises:
+        Interrupted: where there was no result yet.
+    """
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted from None
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def plain(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from sea_ident.cli.inputs import read_robot
 from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, RobotSource
 from sea_ident.cli.output import emit, progress
 
@@ -10,15 +11,7 @@ if TYPE_CHECKING:
     from sea_ident.robot import Robot
 
 
-def read_robot(source: str, annotation: str | None, joints: str | None) -> "Robot":
-    """The robot that the ROBOT argument and its two options mean."""
-    from sea_ident.robot import load_robot
-
-    names = None if joints is None else [name.strip() for name in joints.split(",") if name.strip()]
-    return load_robot(source, annotation, names)
-
-
-def inspect_robot(
+def inspect(
     robot: RobotSource,
     annotation: AnnotationFile = None,
     joints: JointNames = None,

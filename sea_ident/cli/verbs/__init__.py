@@ -1,0 +1,14 @@
+"""The verbs, one per file, in the order in which `--help` lists them."""
+
+from collections.abc import Callable
+
+from sea_ident.cli.verbs.excite import excite
+from sea_ident.cli.verbs.identify import identify
+from sea_ident.cli.verbs.inspect import inspect
+from sea_ident.cli.verbs.report import report
+from sea_ident.cli.verbs.simulate import simulate
+from sea_ident.cli.verbs.validate import validate
+
+VERBS: tuple[Callable[..., None], ...] = (inspect, excite, simulate, identify, validate, report)
+
+__all__ = ["VERBS"]

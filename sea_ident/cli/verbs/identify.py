@@ -1,0 +1,40 @@
+"""`sea-ident identify`: from a recording to a model."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sea_ident.cli.inputs import read_robot
+from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, Period, RecordingFile, ReportFile, RobotSource
+from sea_ident.cli.output import check_targets, emit, progress
+
+
+def identify(
+    robot: RobotSource,
+    recording: RecordingFile,
+    out: Annotated[Path, typer.Option("--out", metavar="MODEL.json", help="Model to write.", show_default=False)],
+    period: Period = None,
+    report: ReportFile = None,
+    annotation: AnnotationFile = None,
+    joints: JointNames = None,
+    as_json: AsJson = False,
+) -> None:
+    """Identify the dynamic model of a robot and its springs from a recording."""
+    from sea_ident.estimation import identify as run
+    from sea_ident.recordings import read_recording
+
+    check_targets(out, report)
+    loaded = read_robot(robot, annotation, joints)
+    measured = read_recording(recording)
+    with progress("identifying"):
+        model = run(loaded, measured, period=period)
+    model.save(out)
+    files = [str(out)]
+    if report is not None:
+        from sea_ident.report import write_report
+
+        with progress("writing the report"):
+            write_report(model, report)
+        files.append(str(report))
+    emit({**model.to_dict(), "files": files}, f"{model.summary()}\nwritten: {', '.join(files)}", as_json=as_json)

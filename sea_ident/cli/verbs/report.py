@@ -1,0 +1,33 @@
+"""`sea-ident report`: a model or a diagnosis as one HTML file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sea_ident.cli.options import AsJson
+from sea_ident.cli.output import check_targets, emit, progress
+
+
+def report(
+    result: Annotated[
+        Path,
+        typer.Argument(metavar="MODEL.json|DIAGNOSIS.json", help="What `identify` wrote.", show_default=False),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="R.html", help="Report to write.", show_default=False)],
+    excitation: Annotated[
+        Path | None, typer.Option("--excitation", metavar="EXC.json", help="Show this excitation in its limits.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a model or a diagnosis as one HTML file that needs no network."""
+    from sea_ident.estimation import read_model
+    from sea_ident.excitation import read_excitation
+    from sea_ident.report import write_report
+
+    check_targets(out)
+    loaded = read_model(result)
+    series = None if excitation is None else read_excitation(excitation)
+    with progress("writing the report"):
+        write_report(loaded, out, excitation=series)
+    emit({"files": [str(out)]}, f"written: {out}", as_json=as_json)

@@ -1,0 +1,28 @@
+"""What a report is about."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sea_ident.estimation import Model
+from sea_ident.excitation import Excitation
+from sea_ident.validation import Validation
+
+if TYPE_CHECKING:
+    from sea_ident.discrepancy import Diagnosis
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """Model, diagnosis and data of one report.
+
+    Attributes:
+        model: the model.
+        excitation: the motion that the robot was asked for, None where not given.
+        validations: comparisons with recordings that were not used in the fit.
+        diagnosis: what is missing in the model, None where it was not diagnosed.
+    """
+
+    model: Model
+    excitation: Excitation | None = None
+    validations: tuple[Validation, ...] = ()
+    diagnosis: "Diagnosis | None" = None

@@ -1,0 +1,287 @@
+"""The robot as triangles and poses, for the viewer of the report."""
+
+import base64
+import io
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import trimesh
+import yourdfpy
+
+from sea_ident._typing import FloatArray, IntArray
+from sea_ident.exceptions import RobotError
+from sea_ident.robot import Robot, find_urdf
+
+MOST_FACES = 9_000
+"""Triangles of a whole robot: enough to recognise it, few enough to draw in a browser and to embed."""
+
+MOST_FRAMES = 240
+_PALETTE = ((118, 130, 146), (46, 109, 168), (214, 118, 44), (52, 134, 96), (150, 88, 150), (168, 140, 40))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One piece of a body.
+
+    Attributes:
+        body: index of the moving body, -1 for what is fixed to the world.
+        color: (3,) red, green, blue, 0 to 255.
+        vertices: (V, 3) in the frame of the body's joint [m].
+        faces: (F, 3) indices of vertices.
+    """
+
+    body: int
+    color: tuple[int, int, int]
+    vertices: FloatArray
+    faces: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A robot in motion.
+
+    Attributes:
+        parts: what is drawn.
+        poses: (K, bodies, 3, 4) rotation and position of every body.
+        period: time from the first pose to the one after the last [s].
+        periodic: whether the motion begins anew after the last pose.
+    """
+
+    parts: tuple[Part, ...]
+    poses: FloatArray
+    period: float
+    periodic: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the viewer reads."""
+        low, high = self.bounds()
+        spread = high - low
+        # look along the thinnest horizontal direction, a little from the side
+        azimuth = (-0.5 if spread[1] <= spread[0] else 0.0) * math.pi + 0.45
+        return {
+            "frames": len(self.poses),
+            "bodies": self.poses.shape[1],
+            "period": self.period,
+            "periodic": self.periodic,
+            "poses": _encode(self.poses.astype("<f4")),
+            "centre": [float(v) for v in (low + high) / 2.0],
+            "radius": float(np.linalg.norm(spread)) / 2.0,
+            "floor": float(low[2]),
+            "azimuth": azimuth,
+            "parts": [
+                {
+                    "body": part.body,
+                    "color": list(part.color),
+                    "vertices": _encode(part.vertices.astype("<f4")),
+                    "faces": _encode(part.faces.astype("<u2")),
+                }
+                for part in self.parts
+            ],
+        }
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest coordinates (3,) that any part reaches [m]."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for part in self.parts:
+            corners = _corners(part.vertices)
+            if part.body >= 0:
+                pose = self.poses[:, part.body]
+                corners = (np.einsum("kij,cj->kci", pose[:, :, :3], corners) + pose[:, None, :, 3]).reshape(-1, 3)
+            low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+        return low, high
+
+
+def build_scene(robot: Robot, time: FloatArray, q: FloatArray, *, periodic: bool) -> Scene:
+    """Triangles and poses of a robot.
+
+    Args:
+        robot: the robot.
+        time: (N,) [s].
+        q: (N, n) link positions [rad] or [m].
+        periodic: whether the motion begins anew after the last sample.
+
+    Returns:
+        The scene, with at most `MOST_FRAMES` poses. Bodies without a drawable shape get a stick to the next joint.
+    """
+    step = max(1, math.ceil(len(time) / MOST_FRAMES))
+    rows = np.arange(0, len(time), step)
+    interval = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    period = interval * (len(time) if periodic else max(len(time) - 1, 1))
+    return Scene(tuple(_parts(robot)), _poses(robot, q[rows]), period, periodic)
+
+
+def _poses(robot: Robot, q: FloatArray) -> FloatArray:
+    model = robot.extended_model
+    data = model.createData()
+    out = np.empty((len(q), len(robot.body_indices), 3, 4))
+    for k, x in enumerate(robot.extended_state(q)):
+        pin.forwardKinematics(model, data, np.ascontiguousarray(x))
+        for i, index in enumerate(robot.body_indices):
+            placement = data.oMi[int(index)]
+            out[k, i, :, :3], out[k, i, :, 3] = placement.rotation, placement.translation
+    return out
+
+
+def _parts(robot: Robot) -> list[Part]:
+    shapes = [shape for shape in _shapes(robot) if len(shape[2])]
+    total = sum(len(faces) for *_, faces in shapes)
+    share = min(1.0, MOST_FACES / max(total, 1))
+    model = robot.model
+    parts = []
+    for link, color, vertices, faces in shapes:
+        frame_id = model.getFrameId(link)
+        if frame_id >= model.nframes:
+            continue
+        frame = model.frames[frame_id]
+        body = int(frame.parentJoint) - 1
+        if share < 1.0 or len(vertices) > 60_000:
+            vertices, faces = simplify(vertices, faces, max(60, int(share * len(faces))))
+        placed = vertices @ frame.placement.rotation.T + frame.placement.translation
+        parts.append(Part(body, color or _PALETTE[(body + 1) % len(_PALETTE)], placed, faces))
+    drawn = {part.body for part in parts}
+    parts.extend(_stick(robot, body) for body in range(len(robot.bodies)) if body not in drawn)
+    return parts
+
+
+def _shapes(robot: Robot) -> list[tuple[str, tuple[int, int, int] | None, FloatArray, IntArray]]:
+    """Link, colour, vertices in the frame of the link, faces."""
+    folder = _folder(robot)
+    urdf = yourdfpy.URDF.load(
+        io.BytesIO(robot.urdf.encode()),
+        build_scene_graph=False,
+        load_meshes=False,
+        load_collision_meshes=False,
+        filename_handler=lambda name: name,
+    )
+    materials = {material.name: material for material in urdf.robot.materials if material is not None}
+    locate = _locator(folder)
+    out = []
+    for link in urdf.robot.links:
+        for visual in link.visuals:
+            mesh = _mesh(visual.geometry, locate)
+            if mesh is None:
+                continue
+            origin = np.eye(4) if visual.origin is None else visual.origin
+            vertices = np.asarray(mesh.vertices) @ origin[:3, :3].T + origin[:3, 3]
+            out.append((link.name, _color(visual.material, materials), vertices, np.asarray(mesh.faces, dtype=np.intp)))
+    return out
+
+
+def _folder(robot: Robot) -> Path | None:
+    try:
+        return find_urdf(robot.source).resolve().parent
+    except RobotError:
+        return None
+
+
+def _locator(folder: Path | None) -> Callable[[str], Path | None]:
+    """How mesh names of a URDF become files: relative to it, or to a package among the folders above it."""
+
+    def locate(name: str) -> Path | None:
+        if folder is None:
+            return None
+        inner = name.removeprefix("package://").removeprefix("file://").removeprefix("model://")
+        for parent in (folder, *folder.parents):
+            for candidate in (parent / inner, parent / inner.partition("/")[2]):
+                if candidate.is_file():
+                    return candidate
+        return None
+
+    return locate
+
+
+def _mesh(geometry: Any, locate: Callable[[str], Path | None]) -> Any:
+    """The surface of a URDF geometry as a trimesh, None where there is none that can be drawn."""
+    if geometry.box is not None:
+        return trimesh.creation.box(extents=geometry.box.size)
+    if geometry.cylinder is not None:
+        return trimesh.creation.cylinder(radius=geometry.cylinder.radius, height=geometry.cylinder.length, sections=36)
+    if geometry.sphere is not None:
+        return trimesh.creation.icosphere(subdivisions=2, radius=geometry.sphere.radius)
+    path = None if geometry.mesh is None else locate(geometry.mesh.filename)
+    if path is None:
+        return None
+    try:
+        loaded = trimesh.load(path, force="mesh")
+    except Exception:  # a picture is not worth an error: what cannot be read is drawn as a stick
+        return None
+    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
+        return None
+    scale = geometry.mesh.scale
+    return loaded if scale is None else trimesh.Trimesh(loaded.vertices * scale, loaded.faces, process=False)
+
+
+def _color(material: Any, known: dict[str, Any]) -> tuple[int, int, int] | None:
+    if material is None:
+        return None
+    color = material.color or getattr(known.get(material.name), "color", None)
+    if color is None:
+        return None
+    red, green, blue = (int(np.clip(255.0 * float(v), 0, 255)) for v in color.rgba[:3])
+    return red, green, blue
+
+
+def _stick(robot: Robot, body: int) -> Part:
+    """A slender bar from the joint of a body to the next joint, or to its centre of mass."""
+    model = robot.model
+    children = [k for k in range(1, model.njoints) if model.parents[k] == body + 1]
+    end = model.jointPlacements[children[0]].translation if children else model.inertias[body + 1].lever
+    length = float(np.linalg.norm(end))
+    if length < 1e-6:
+        mesh = trimesh.creation.icosphere(subdivisions=1, radius=0.02)
+    else:
+        mesh = trimesh.creation.cylinder(radius=0.06 * length + 0.004, segment=[np.zeros(3), end], sections=16)
+    color = _PALETTE[(body + 1) % len(_PALETTE)]
+    return Part(body, color, np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.intp))
+
+
+def simplify(vertices: FloatArray, faces: IntArray, most: int) -> tuple[FloatArray, IntArray]:
+    """A coarser surface: vertices that fall into one cell of a grid become one.
+
+    Args:
+        vertices: (V, 3) [m].
+        faces: (F, 3) indices.
+        most: faces wanted at most.
+
+    Returns:
+        Vertices and faces, of the finest grid tried that has at most `most` faces.
+    """
+    low = vertices.min(axis=0)
+    size = float((vertices.max(axis=0) - low).max()) or 1.0
+    coarse, fine = 1, 256
+    best: tuple[FloatArray, IntArray] = (vertices[:0], faces[:0])
+    while coarse <= fine:
+        cells = (coarse + fine) // 2
+        keys = np.floor((vertices - low) / size * cells).astype(np.int64)
+        _, inverse = np.unique(keys, axis=0, return_inverse=True)
+        inverse = inverse.reshape(-1)
+        joined = inverse[faces]
+        solid = (
+            (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
+        )  # fmt: skip
+        # A face and its twin have one set of corners.
+        _, first = np.unique(np.sort(joined[solid], axis=1), axis=0, return_index=True)
+        kept = joined[solid][np.sort(first)]
+        if len(kept) <= most:
+            count = np.bincount(inverse).astype(float)
+            centres = np.stack([np.bincount(inverse, vertices[:, i]) / count for i in range(3)], axis=1)
+            used, renamed = np.unique(kept, return_inverse=True)
+            best = centres[used], renamed.reshape(-1, 3).astype(np.intp)
+            coarse = cells + 1
+        else:
+            fine = cells - 1
+    return best
+
+
+def _corners(vertices: FloatArray) -> FloatArray:
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def _encode(values: Any) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

@@ -1,0 +1,49 @@
+"""Prediction of recordings that were not used in the fit."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from sea_ident.report.chart import Chart, Line
+from sea_ident.report.content import Content
+from sea_ident.report.section import Section
+
+
+class Validations(Section):
+    """Measured and predicted torque of other motions."""
+
+    key: ClassVar[str] = "validations"
+    title: ClassVar[str] = "Motions that were not used in the fit"
+    needs: ClassVar[str] = "a recording to predict"
+
+    def context(self, content: Content) -> dict[str, Any] | None:
+        """One chart per joint and recording, with the numbers."""
+        if not content.validations:
+            return None
+        joints = content.model.robot.joints
+        groups = []
+        for number, validation in enumerate(content.validations):
+            time = validation.processed.motion.time - validation.processed.motion.time[0]
+            figures, rows = [], []
+            for i, joint in enumerate(joints):
+                measured, predicted = validation.processed.tau_motor[:, i], validation.predicted[:, i]
+                chart = Chart(
+                    [
+                        Line(time, measured, "measured", "measured"),
+                        Line(time, predicted, "predicted", "predicted"),
+                        Line(time, np.where(validation.used, measured - predicted, 0.0), "residual", "residual"),
+                    ],
+                    "time [s]", f"torque [{joint.torque_unit}]", joint.name, height=200, link=f"validation{number}",
+                )  # fmt: skip
+                figures.append(chart.svg())
+                rows.append(
+                    (
+                        joint.name,
+                        validation.rms[i],
+                        validation.noise_std[i],
+                        100 * validation.nrms[i],
+                        joint.torque_unit,
+                    )
+                )
+            groups.append({"name": validation.recording, "figures": figures, "rows": rows, "legend": chart.legend()})
+        return {"groups": groups}
