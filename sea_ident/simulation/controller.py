@@ -14,7 +14,8 @@ from sea_ident.exceptions import SimulationError
 from sea_ident.motion import Motion
 from sea_ident.regressor import inverse_dynamics
 from sea_ident.robot import Robot
-from sea_ident.simulation.plant import Plant
+from sea_ident.simulation.elastic_inverse import elastic_inverse
+from sea_ident.simulation.plant import Plant, plant_from_robot
 from sea_ident.simulation.reference import Reference
 
 
@@ -122,9 +123,6 @@ class ComputedTorque(Controller):
 
     def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
         """The drive at the times (N,) [s]."""
-        from sea_ident.simulation.elastic_inverse import elastic_inverse
-        from sea_ident.simulation.plant import plant_from_robot
-
         model = plant_from_robot(robot) if self.model is None else self.model
         motion, torque = elastic_inverse(model, reference, time, self.smoothing)
         velocity_gain = reference_inertia(model.robot, motion.q) * self.bandwidth

@@ -40,16 +40,20 @@ class ClosedLoop:
         for k, i in enumerate(self.elastic):
             self.motor[i] = n + k
         self.size = size = n + len(self.elastic)
-        self.map = np.zeros((robot.extended_model.nv, size))
-        self.map[:, :n] = robot.link_map
+        self._map = np.zeros((robot.extended_model.nv, size))
+        self._map[:, :n] = robot.link_map
         for i in range(n):
-            self.map[:, self.motor[i]] += robot.motor_map[:, i]
-        self.map = np.asfortranarray(self.map)
-        self._map_t = np.ascontiguousarray(self.map.T)
+            self._map[:, self.motor[i]] += robot.motor_map[:, i]
+        self._map_t = np.ascontiguousarray(self._map.T)
         self._offset = robot.offset
         self._model = robot.extended_model
         self._data = robot.extended_model.createData()
-        self._added_inertia = None if planted is None else planted.added_inertia(self.n, self.motor, size)
+        self._added_inertia = None if planted is None else planted.added_inertia(size)
+
+        self._inverse: FloatArray | None = None
+        if len(self._map) == size and self._added_inertia is None and np.linalg.matrix_rank(self._map) == size:
+            self._inverse = np.linalg.inv(self._map)
+            self._inverse_t = np.ascontiguousarray(self._inverse.T)
 
         self.link_friction = list(link_friction)
         kp, kd = drive.position_gain.tolist(), drive.velocity_gain.tolist()
@@ -112,23 +116,21 @@ class ClosedLoop:
             self.planted.add(time, elapsed, u, w, tau_motor, tau_spring, out)
         return out
 
-    def mass(self, u: FloatArray) -> FloatArray:
-        """(size, size) mass matrix."""
-        mass = self._map_t @ pin.crba(self._model, self._data, self.map @ u + self._offset) @ self.map
-        return mass if self._added_inertia is None else mass + self._added_inertia
-
-    def bias_forces(self, u: FloatArray, w: FloatArray) -> FloatArray:
-        """(size,) Coriolis, centrifugal and gravity forces."""
-        x = self.map @ u + self._offset
-        torque: FloatArray = self._map_t @ pin.nonLinearEffects(self._model, self._data, x, self.map @ w)
-        return torque
-
     def evaluate(self, time: float, bias: list[float], y: FloatArray) -> None:
         """Torques and `acceleration` at a state (2 size,) that was reached by accepted steps."""
-        u, w = y[: self.size], y[self.size :]
-        force = np.array(self.forces(time, 0.0, bias, u.tolist(), w.tolist())) - self.bias_forces(u, w)
-        _, self.acceleration, info = dposv(self.mass(u), force)
-        if info != 0:
+        self.acceleration = self._acceleration(time, 0.0, bias, y[: self.size], y[self.size :])
+
+    def check_mass(self, y: FloatArray) -> None:
+        """Refuse a state in which the mass matrix is not positive definite.
+
+        Raises:
+            SimulationError: the message names the joint with the smallest inertia.
+        """
+        u = y[: self.size]
+        mass = self._map_t @ pin.crba(self._model, self._data, self._map @ u + self._offset) @ self._map
+        if self._added_inertia is not None:
+            mass += self._added_inertia
+        if dpotrf(mass)[1] != 0:
             raise SimulationError(self._not_positive(u))
 
     def accept(self, time: float, y: FloatArray) -> None:
@@ -143,7 +145,7 @@ class ClosedLoop:
             if link_friction is not None:
                 link_friction.accept(values[i], values[size + i])
         if self.planted is not None:
-            self.planted.accept(time, values[:size], values[size:])
+            self.planted.accept(time, values[:size], values[size:], self.tau_motor, self.tau_spring)
 
     # -- one step ----------------------------------------------------------------------------------------------------
 
@@ -156,45 +158,65 @@ class ClosedLoop:
             y: (2 size,) positions and velocities.
         """
         size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
-        mass = stiffness = factor = None
+        u, w = y[:size], y[size:]
+        u_list, w_list = u.tolist(), w.tolist()
+        mass, force = self._mass_and_force(time, 0.0, biases[0], u, w, u_list, w_list)
+        stiffness, damping = self._jacobian(time, u_list, w_list)
+        stiffness *= hgamma
+        factor, info = dpotrf(mass / hgamma + damping + stiffness)
+        if info != 0:
+            raise SimulationError(self._not_positive(u))
+        rate = w
+        rhs = force - stiffness.dot(w)
         for i in range(self._stages):
-            if i == 0:
-                stage = y
-            else:
-                both = self._combine[i].dot(increments[:i])
-                stage = y + both[0]
-            u, w = stage[:size], stage[size:]
-            u_list, w_list = u.tolist(), w.tolist()
-            x = self.map.dot(u) + self._offset
-            force = np.array(self.forces(time + elapsed[i], elapsed[i], biases[i], u_list, w_list))
-            force -= self._map_t.dot(pin.nonLinearEffects(self._model, self._data, x, self.map.dot(w)))
-            stage_mass = self._map_t.dot(pin.crba(self._model, self._data, x)).dot(self.map)
-            if self._added_inertia is not None:
-                stage_mass += self._added_inertia
-            if i == 0:
-                mass = stage_mass
-                stiffness, damping = self._jacobian(time, biases[0], u_list, w_list)
-                rate = w
-                rhs = force - (hgamma * stiffness).dot(w)
-                factor, info = dpotrf(mass / hgamma + damping + hgamma * stiffness)
-                if info != 0:
-                    raise SimulationError(self._not_positive(u))
-            else:
-                _, acceleration, info = dposv(stage_mass, force)
-                if info != 0:
-                    raise SimulationError(self._not_positive(u))
-                coupling = both[1]
+            if i > 0:
+                shift, coupling = self._combine[i].dot(increments[:i])
+                stage = y + shift
+                u, w = stage[:size], stage[size:]
+                acceleration = self._acceleration(time + elapsed[i], elapsed[i], biases[i], u, w)
                 rate = w + coupling[:size]
-                rhs = mass.dot(acceleration + coupling[size:]) - (hgamma * stiffness).dot(rate)
-            change, _ = dpotrs(factor, rhs)
+                rhs = mass.dot(acceleration + coupling[size:]) - stiffness.dot(rate)
+            change = dpotrs(factor, rhs)[0]
             row = increments[i]
             row[size:] = change
             row[:size] = hgamma * (rate + change)
-        return y + self._weights.dot(increments)
+        result: FloatArray = y + self._weights.dot(increments)
+        return result
 
-    def _jacobian(
-        self, time: float, bias: list[float], u: list[float], w: list[float]
+    def _acceleration(self, time: float, elapsed: float, bias: list[float], u: FloatArray, w: FloatArray) -> FloatArray:
+        """(size,) accelerations at a trial state."""
+        if self._inverse is None:
+            mass, force = self._mass_and_force(time, elapsed, bias, u, w, u.tolist(), w.tolist())
+            _, acceleration, info = dposv(mass, force)
+            if info != 0:
+                raise SimulationError(self._not_positive(u))
+        else:  # every coordinate is a joint of Pinocchio's model: its forward dynamics are the shorter way
+            force = self._inverse_t.dot(np.array(self.forces(time, elapsed, bias, u.tolist(), w.tolist())))
+            x = self._map.dot(u) + self._offset
+            acceleration = self._inverse.dot(pin.aba(self._model, self._data, x, self._map.dot(w), force))
+        result: FloatArray = acceleration
+        return result
+
+    def _mass_and_force(
+        self,
+        time: float,
+        elapsed: float,
+        bias: list[float],
+        u: FloatArray,
+        w: FloatArray,
+        u_list: list[float],
+        w_list: list[float],
     ) -> tuple[FloatArray, FloatArray]:
+        """Mass matrix (size, size), and forces (size,) with gravity, Coriolis and centrifugal forces in them."""
+        x = self._map.dot(u) + self._offset
+        force = np.array(self.forces(time, elapsed, bias, u_list, w_list))
+        force -= self._map_t.dot(pin.nonLinearEffects(self._model, self._data, x, self._map.dot(w)))
+        mass: FloatArray = self._map_t.dot(pin.crba(self._model, self._data, x)).dot(self._map)
+        if self._added_inertia is not None:
+            mass += self._added_inertia
+        return mass, force
+
+    def _jacobian(self, time: float, u: list[float], w: list[float]) -> tuple[FloatArray, FloatArray]:
         """Symmetric stiffness and damping of the forces: an approximation is enough for the method's order."""
         stiffness, damping = self._constant_stiffness.copy(), self._constant_damping.copy()
         for i, m, k1, k3, motor_slope, link_slope in self._slopes:
@@ -218,7 +240,8 @@ class ClosedLoop:
             k = int(np.flatnonzero(~np.isfinite(u))[0])
             i = k if k < self.n else self.elastic[k - self.n]
             return f"the position of joint {robot.joint_names[i]!r} is not finite"
-        diagonal = np.diag(self.mass(u))
+        x = self._map.dot(u) + self._offset
+        diagonal = np.diag(self._map_t @ pin.crba(self._model, self._data, x) @ self._map)
         k = int(np.argmin(diagonal))
         i = k if k < self.n else self.elastic[k - self.n]
         side = "link" if k < self.n else "motor"

@@ -14,13 +14,19 @@ from sea_ident.exceptions import SimulationError
 
 
 class JointFriction(Protocol):
-    """Friction of one side of one joint in a running simulation."""
+    """Friction of one side of one joint in a running simulation.
+
+    Attributes:
+        level: factor on the Coulomb friction [-].
+    """
+
+    level: float
 
     def torque(self, position: float, velocity: float) -> float:
         """Torque at a trial state, positive at positive speed [N m]."""
 
     def slope(self, velocity: float) -> float:
-        """Bound of the slope over the speed, for the implicit part of the integrator [N m s/rad]."""
+        """Slope over the speed, for the implicit part of the integrator [N m s/rad]."""
 
     def accept(self, position: float, velocity: float) -> None:
         """The state at the end of a step that is kept."""
@@ -54,17 +60,17 @@ class SmoothCoulomb(FrictionLaw):
 
 
 class _SmoothJoint:
-    __slots__ = ("coulomb", "smoothing", "viscous")
+    __slots__ = ("coulomb", "level", "smoothing", "viscous")
 
     def __init__(self, viscous: float, coulomb: float, smoothing: float) -> None:
-        self.viscous, self.coulomb, self.smoothing = viscous, coulomb, smoothing
+        self.viscous, self.coulomb, self.smoothing, self.level = viscous, coulomb, smoothing, 1.0
 
     def torque(self, position: float, velocity: float) -> float:
-        return self.viscous * velocity + self.coulomb * tanh(velocity / self.smoothing)
+        return self.viscous * velocity + self.coulomb * self.level * tanh(velocity / self.smoothing)
 
     def slope(self, velocity: float) -> float:
-        # The secant from zero, not the tangent: a step that crosses zero speed must already see the steep part.
-        return self.viscous + self.coulomb / max(self.smoothing, abs(velocity))
+        sign = tanh(velocity / self.smoothing)
+        return self.viscous + self.coulomb * self.level / self.smoothing * (1.0 - sign * sign)
 
     def accept(self, position: float, velocity: float) -> None:
         return None
@@ -92,15 +98,15 @@ class PreslidingCoulomb(FrictionLaw):
 
 
 class _PreslidingJoint:
-    __slots__ = ("coulomb", "deflection", "last_position", "load", "viscous")
+    __slots__ = ("coulomb", "deflection", "last_position", "level", "load", "viscous")
 
     def __init__(self, viscous: float, coulomb: float, deflection: float, position: float) -> None:
         self.viscous, self.coulomb, self.deflection = viscous, coulomb, deflection
-        self.last_position, self.load = position, 0.0
+        self.last_position, self.load, self.level = position, 0.0, 1.0
 
     def _load(self, position: float) -> float:
         distance = position - self.last_position
-        end = 1.0 if distance > 0.0 else -1.0
+        end = self.level if distance > 0.0 else -self.level
         return end + (self.load - end) * exp(-abs(distance) / self.deflection)
 
     def torque(self, position: float, velocity: float) -> float:
@@ -140,43 +146,41 @@ class FrictionJitter:
         """Every pass alike."""
         return FrictionJitter(spread=0.0)
 
-    def on(self, friction: JointFriction, coulomb: float, smoothing: float, seed: np.random.SeedSequence) -> JointFriction:
+    def on(self, friction: JointFriction, seed: np.random.SeedSequence) -> JointFriction:
         """The friction of a joint with this jitter."""
-        if self.spread == 0.0 or coulomb == 0.0:
+        if self.spread == 0.0:
             return friction
-        return _JitteredJoint(friction, coulomb, smoothing, self, np.random.default_rng(seed))
+        return _JitteredJoint(friction, self, np.random.default_rng(seed))
 
 
 class _JitteredJoint:
-    """Amplitudes for both directions, so that a step across zero speed sees the right one on each side."""
+    """Two amplitudes, one for each direction, so that a step across zero speed sees the right one on each side."""
 
-    __slots__ = ("amplitudes", "coulomb", "forward", "friction", "generator", "jitter", "smoothing")
+    __slots__ = ("amplitudes", "forward", "friction", "generator", "jitter", "level")
 
-    def __init__(
-        self,
-        friction: JointFriction,
-        coulomb: float,
-        smoothing: float,
-        jitter: FrictionJitter,
-        generator: np.random.Generator,
-    ) -> None:
-        self.friction, self.coulomb, self.smoothing = friction, coulomb, smoothing
-        self.jitter, self.generator = jitter, generator
+    def __init__(self, friction: JointFriction, jitter: FrictionJitter, generator: np.random.Generator) -> None:
+        self.friction, self.jitter, self.generator, self.level = friction, jitter, generator, 1.0
         self.amplitudes = [self._draw(), self._draw()]
         self.forward = False
 
     def _draw(self) -> float:
-        return self.coulomb * self.jitter.spread * float(self.generator.standard_normal())
+        # Friction never pushes: the few draws beyond are cut on both sides, so that the mean stays zero.
+        return max(-1.0, min(1.0, self.jitter.spread * float(self.generator.standard_normal())))
+
+    def _set_level(self, velocity: float) -> None:
+        ratio = velocity / self.jitter.speed
+        self.friction.level = self.level * (1.0 + self.amplitudes[velocity > 0.0] * exp(-ratio * ratio))
 
     def torque(self, position: float, velocity: float) -> float:
-        ratio = velocity / self.jitter.speed
-        extra = self.amplitudes[velocity > 0.0] * exp(-ratio * ratio) * tanh(velocity / self.smoothing)
-        return self.friction.torque(position, velocity) + extra
+        self._set_level(velocity)
+        return self.friction.torque(position, velocity)
 
     def slope(self, velocity: float) -> float:
+        self._set_level(velocity)
         return self.friction.slope(velocity)
 
     def accept(self, position: float, velocity: float) -> None:
+        self._set_level(velocity)
         self.friction.accept(position, velocity)
         forward = velocity > 0.0
         if forward != self.forward:

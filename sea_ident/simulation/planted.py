@@ -26,12 +26,14 @@ class PlantedTorques:
         self,
         robot: Robot,
         effects: Sequence[PlantedEffect],
-        motor: Sequence[int],
+        begin: float,
         period: float,
         temperature: Callable[[float], FloatArray] | None,
     ) -> None:
-        self._robot, self._period, self._temperature = robot, period, temperature
-        self._motor = np.array(motor, dtype=np.intp)
+        self._robot, self._temperature = robot, temperature
+        self._begin, self._period = begin, period
+        self._motor = np.arange(robot.n)
+        self._motor[robot.elastic_indices] = robot.n + np.arange(len(robot.elastic_indices))
         self._effects = tuple(effects)
         acting = [p for p in effects if overrides(p.effect, "torque")]
         hooks = [(p.effect.side is Side.SPRING, p.effect.torque(robot, p.values)) for p in acting]
@@ -39,13 +41,14 @@ class PlantedTorques:
         self._springs = [hook for spring, hook in hooks if spring]
         self._others = [hook for spring, hook in hooks if not spring]
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
-        self._tau = [0.0] * robot.n
 
-    def added_inertia(self, n: int, motor: Sequence[int], size: int) -> FloatArray | None:
+    def added_inertia(self, size: int) -> FloatArray | None:
         """(size, size) what effects add to the mass matrix, None where none does."""
-        parts = [p.effect.added_inertia(self._robot, p.values) for p in self._effects if overrides(p.effect, "added_inertia")]
+        adding = [p for p in self._effects if overrides(p.effect, "added_inertia")]
+        parts = [p.effect.added_inertia(self._robot, p.values) for p in adding]
         if not parts:
             return None
+        n = self._robot.n
         select = np.zeros((2 * n, size))
         select[np.arange(n), np.arange(n)] = 1.0
         select[n + np.arange(n), self._motor] = 1.0
@@ -53,7 +56,13 @@ class PlantedTorques:
         return total
 
     def _state(
-        self, time: float, elapsed: float, u: list[float], w: list[float], tau_motor: list[float], tau_spring: list[float]
+        self,
+        time: float,
+        elapsed: float,
+        u: list[float],
+        w: list[float],
+        tau_motor: list[float],
+        tau_spring: list[float],
     ) -> SimulationState:
         n, motor = self._robot.n, self._motor
         position, velocity = np.array(u), np.array(w)
@@ -66,7 +75,7 @@ class PlantedTorques:
             tau_spring=np.array(tau_spring),
             tau_motor=np.array(tau_motor),
             elapsed=elapsed,
-            period_index=max(0, int(np.floor(time / self._period + 1e-9))),
+            period_index=max(0, int(np.floor((time - self._begin) / self._period + 1e-9))),
             temperature=None if self._temperature is None else self._temperature(time),
         )
 
@@ -126,10 +135,12 @@ class PlantedTorques:
         self.add(time, 0.0, u, w, list(tau_motor), list(tau_spring), out)
         return out
 
-    def accept(self, time: float, u: list[float], w: list[float]) -> None:
-        """Tell the effects with memory where the step ended."""
+    def accept(
+        self, time: float, u: list[float], w: list[float], tau_motor: list[float], tau_spring: list[float]
+    ) -> None:
+        """Tell the effects with memory where the step ended; torques are those of the last stage."""
         if self._memory:
-            state = self._state(time, 0.0, u, w, self._tau, self._tau)
+            state = self._state(time, 0.0, u, w, tau_motor, tau_spring)
             for accept in self._memory:
                 accept(state)
 

@@ -25,6 +25,10 @@ class Reference(Protocol):
     """A motion that can be asked for at any time."""
 
     @property
+    def begin(self) -> float:
+        """Time at which it starts [s]."""
+
+    @property
     def period(self) -> float | None:
         """Period [s], None where it does not repeat."""
 
@@ -33,7 +37,7 @@ class Reference(Protocol):
         """Length of one pass [s]."""
 
     def motion(self, time: FloatArray) -> Motion:
-        """(N, n) rigid motion at the times (N,) [s] from the start."""
+        """(N, n) rigid motion at the times (N,) [s], counted from `begin`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +45,11 @@ class PeriodicReference:
     """A Fourier series."""
 
     series: FourierSeries
+
+    @property
+    def begin(self) -> float:
+        """0 [s]."""
+        return 0.0
 
     @property
     def period(self) -> float | None:
@@ -68,6 +77,11 @@ class SampledReference:
         self._curve = BPoly.from_derivatives(motion.time - self._start, values)
         self._rates = [self._curve.derivative(order) for order in (1, 2)]
         self._duration = float(motion.time[-1]) - self._start
+
+    @property
+    def begin(self) -> float:
+        """Time of the first sample [s]."""
+        return self._start
 
     @property
     def period(self) -> float | None:

@@ -1,0 +1,137 @@
+"""Steps through the passes of a reference, and keeps what is recorded."""
+
+from dataclasses import dataclass
+from math import ceil, isfinite
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.exceptions import SimulationError
+from sea_ident.motion import Motion
+from sea_ident.simulation.controller import Drive
+from sea_ident.simulation.dynamics import ClosedLoop
+from sea_ident.simulation.reference import Reference
+
+FASTEST = 1e4
+"""A speed beyond this [rad/s or m/s] is a divergence."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Samples and steps of one pass of a reference.
+
+    Attributes:
+        samples: number of sampling intervals.
+        substeps: steps of the integrator in each.
+        duration: of the pass [s].
+    """
+
+    samples: int
+    substeps: int
+    duration: float
+
+    @staticmethod
+    def build(reference: Reference, rate: float, step: float) -> "Clock":
+        """At most `step` [s] long steps, and about `rate` samples a second [Hz]."""
+        samples = max(1, round(rate * reference.duration))
+        return Clock(samples, ceil(reference.duration / samples / step - 1e-9), reference.duration)
+
+    @property
+    def interval(self) -> float:
+        """Time between samples [s]."""
+        return self.duration / self.samples
+
+    @property
+    def step(self) -> float:
+        """Step of the integrator [s]."""
+        return self.interval / self.substeps
+
+    def stage_times(self, nodes: FloatArray) -> FloatArray:
+        """(steps + 1, stages) flattened: times of all stages of a pass, and of the step after it [s]."""
+        steps = np.arange(self.samples * self.substeps + 1)
+        times: FloatArray = (self.step * (steps[:, None] + nodes)).ravel()
+        return times
+
+
+class Passes:
+    """A closed loop on its way through time."""
+
+    def __init__(self, system: ClosedLoop, drive: Drive, clock: Clock, stages: int, begin: float) -> None:
+        self._system, self._clock, self._begin = system, clock, begin
+        self._biases: list[list[list[float]]] = drive.bias.reshape(-1, stages, system.n).tolist()
+        self._states: list[FloatArray] = []
+        self._accelerations: list[FloatArray] = []
+        self._tau_motor: list[list[float]] = []
+        self._tau_spring: list[list[float]] = []
+        self.steps = 0
+
+    def settle(self, state: FloatArray) -> FloatArray:
+        """State after one pass that is not recorded, in the time before the recording."""
+        return self._run(state, self._begin - self._clock.duration, keep=False)
+
+    def record(self, state: FloatArray, number: int) -> FloatArray:
+        """State after the recorded pass of this number."""
+        return self._run(state, self._begin + number * self._clock.duration, keep=True)
+
+    def record_end(self, state: FloatArray) -> None:
+        """Record the state at the end of the only pass."""
+        self._keep(self._begin + self._clock.duration, len(self._biases) - 1, state)
+
+    def _run(self, state: FloatArray, begin: float, *, keep: bool) -> FloatArray:
+        system, biases, h, k = self._system, self._biases, self._clock.step, 0
+        for _ in range(self._clock.samples):
+            if keep:
+                self._keep(begin + k * h, k, state)
+            for _ in range(self._clock.substeps):
+                try:
+                    state = system.step(begin + k * h, biases[k], state)
+                except (SimulationError, OverflowError) as error:
+                    raise SimulationError(f"the simulation diverged at {begin + k * h:.4f} s: {error}") from None
+                k += 1
+                system.accept(begin + k * h, state)
+            self._check(state, begin + k * h)
+        self.steps += k
+        return state
+
+    def _keep(self, time: float, k: int, state: FloatArray) -> None:
+        system = self._system
+        system.evaluate(time, self._biases[k][0], state)
+        self._states.append(state)
+        self._accelerations.append(system.acceleration)
+        self._tau_motor.append(list(system.tau_motor))
+        self._tau_spring.append(list(system.tau_spring))
+
+    def _check(self, state: FloatArray, time: float) -> None:
+        size = len(state) // 2
+        if isfinite(float(state.sum())) and float(np.abs(state[size:]).max()) < FASTEST:
+            return
+        robot = self._system.plant.robot
+        speeds = np.where(np.isfinite(state[size:]), np.abs(state[size:]), np.inf)
+        k = int(np.argmax(speeds))
+        i, side = (k, "link") if k < robot.n else (int(robot.elastic_indices[k - robot.n]), "motor")
+        raise SimulationError(
+            f"the simulation diverged at {time:.4f} s: the {side} of joint {robot.joint_names[i]!r} moves at "
+            f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s; take a shorter step than {self._clock.step:g} s, or "
+            "softer gains of the controller"
+        )
+
+    def motion(self) -> Motion:
+        """(N, n) recorded motion."""
+        states, accelerations = np.array(self._states), np.array(self._accelerations)
+        n, motors, size = self._system.n, self._system.motor, self._system.size
+        position, velocity = states[:, :size], states[:, size:]
+        time = self._begin + np.arange(len(states), dtype=np.float64) * self._clock.interval
+        return Motion(
+            time, position[:, :n], velocity[:, :n], accelerations[:, :n],
+            position[:, motors], velocity[:, motors], accelerations[:, motors],
+        )  # fmt: skip
+
+    @property
+    def tau_motor(self) -> FloatArray:
+        """(N, n) recorded torques of the motors [N m]."""
+        return np.array(self._tau_motor)
+
+    @property
+    def tau_spring(self) -> FloatArray:
+        """(N, n) recorded torques of the springs [N m]."""
+        return np.array(self._tau_spring)
