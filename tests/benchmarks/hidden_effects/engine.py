@@ -1,0 +1,355 @@
+"""The MuJoCo plant: bodies by MuJoCo, forces and time stepping by the benchmark itself.
+
+Positions live on the steps and velocities between them (leapfrog): second order, and Coulomb friction is solved for
+implicitly, so that it really holds at zero speed.
+"""
+
+from dataclasses import dataclass
+from math import pi, tanh
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from sea_ident.motion import FourierSeries, Motion
+from sea_ident.regressor import inverse_dynamics
+from tests.benchmarks.hidden_effects import forms
+from tests.benchmarks.hidden_effects.case import FloatArray, Noise, Planted
+from tests.benchmarks.hidden_effects.mjcf import Coupling, Flexibility, Payload, build_mjcf
+from tests.benchmarks.hidden_effects.plants import Truth
+
+STEP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """What really happened, at the recorded instants.
+
+    Attributes:
+        motion: exact states with accelerations.
+        tau_motor: (N, n) torque that the drive was asked for and that its current shows [N m].
+        tau_spring: (N, n) torque that the spring gives to the link, at a rigid joint the motor torque less its
+            friction [N m].
+        temperature: (N, n) of the motors [degC].
+    """
+
+    motion: Motion
+    tau_motor: FloatArray
+    tau_spring: FloatArray
+    temperature: FloatArray
+
+
+@dataclass(frozen=True)
+class Friction:
+    """How the base friction behaves.
+
+    Attributes:
+        form: `ramp`, linear up to the smoothing speed and constant beyond, or `tanh`.
+        smoothing: speed [rad/s]; with `ramp` and 0 it sticks.
+        jitter: spread of its level from pass to pass near zero speed [-].
+        jitter_speed: speed up to which it acts [rad/s].
+    """
+
+    form: str = "ramp"
+    smoothing: float = 0.005
+    jitter: float = 0.0
+    jitter_speed: float = 0.1
+
+
+def friction_of(noise: Noise, form: str, smoothing: float) -> Friction:
+    """Friction of a case."""
+    return Friction(form, smoothing, noise.jitter, noise.jitter_speed)
+
+
+def reference_torque(truth: Truth, series: FourierSeries, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Motor positions that would move the links on the series, and the torques of the drives for it.
+
+    Returns:
+        theta (N, n) and torque (N, n), without what the truth hides.
+    """
+    robot = truth.robot
+    rigid = series.motion(time)
+    link, _ = inverse_dynamics(robot, rigid)
+    stiff = np.where(truth.stiffness > 0.0, truth.stiffness, np.inf)
+    deflection = link / stiff
+    theta = rigid.q + deflection
+    step = float(time[1] - time[0])
+    rate = (np.roll(theta, -1, 0) - np.roll(theta, 1, 0)) / (2.0 * step)
+    acceleration = (np.roll(theta, -1, 0) - 2.0 * theta + np.roll(theta, 1, 0)) / step**2
+    motion = Motion(time, rigid.q, rigid.dq, rigid.ddq, theta, rate, acceleration)
+    bodies, rotors = inverse_dynamics(robot, motion)
+    friction = truth.viscous * rate + truth.coulomb * np.tanh(rate / 0.05)
+    return theta, bodies + rotors + friction
+
+
+def simulate_mujoco(
+    truth: Truth,
+    series: FourierSeries,
+    periods: int,
+    *,
+    planted: tuple[Planted, ...] = (),
+    friction: Friction | None = None,
+    actuator_noise: FloatArray | None = None,
+    settle: int = 1,
+    rate: float = 200.0,
+    seed: int = 0,
+    step: float = STEP,
+) -> Exact:
+    """Simulate a robot that tracks a trajectory with motor feedback.
+
+    Args:
+        truth: the robot and its base model.
+        series: trajectory of the links; its period must be a whole number of steps.
+        periods: periods that are recorded.
+        planted: effects beyond the base model.
+        friction: how the base friction behaves.
+        actuator_noise: (n,) standard deviation of the drives' torque noise [N m].
+        settle: periods before the recording starts.
+        rate: of the recording [Hz].
+        seed: of noise and jitter.
+        step: time step [s].
+
+    Returns:
+        The exact states and torques of the recorded periods.
+    """
+    robot, n = truth.robot, truth.robot.n
+    friction = friction or Friction()
+    per_period = round(series.period / step)
+    stride = round(1.0 / (rate * step))
+    first, total = settle * per_period, (settle + periods) * per_period
+    duration = periods * series.period
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 77]))
+
+    model = build_mjcf(robot, step, *_structure(planted, truth))
+    for p in planted:
+        if p.effect == "base_tilt":
+            model.opt.gravity[:] = pin.exp3(p.size * np.array([p.shape["x"], p.shape["y"], 0.0])) @ model.opt.gravity
+    data = mujoco.MjData(model)
+
+    def dof(name: str) -> int:
+        return int(model.jnt_dofadr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)])
+
+    elastic = list(robot.elastic)
+    driven = [e or j.actuator is not None for e, j in zip(elastic, robot.joints, strict=True)]
+    if any(d and not e for d, e in zip(driven, elastic, strict=True)):
+        raise NotImplementedError("rigid joints with rotors are not simulated")
+    iq = [dof(name) for name in robot.joint_names]
+    it = [dof(f"{name} rotor") if e else iq[i] for i, (name, e) in enumerate(zip(robot.joint_names, elastic, strict=True))]
+    soft = [(dof(f"{p.joint} flexibility"), robot.index(p.joint)) for p in planted if p.effect == "link_flexibility"]
+    gear = [float(g) if e else 1.0 for g, e in zip(robot.gear_ratios, elastic, strict=True)]
+
+    time = np.arange(per_period) * step
+    theta_reference, torque_reference = reference_torque(truth, series, time)
+    rate_reference = (np.roll(theta_reference, -1, 0) - np.roll(theta_reference, 1, 0)) / (2 * step)
+
+    inertia = _motor_inertias(model, data, series, iq, it, gear, elastic)
+    bandwidth = 2.0 * pi * 4.0
+    kp = [m * bandwidth**2 for m in inertia]
+    kd = [2.0 * 0.8 * m * bandwidth for m in inertia]
+    theta_rows, rate_rows, torque_rows = theta_reference.tolist(), rate_reference.tolist(), torque_reference.tolist()
+    noise_rows = None
+    if actuator_noise is not None and np.any(actuator_noise > 0.0):
+        noise_rows = (rng.standard_normal((total, n)) * actuator_noise).tolist()
+
+    hooks = [forms.Hooks() for _ in range(n)]
+    wide: list[forms.Wide] = []
+    for p in planted:
+        forms.bind(p, truth, hooks, wide, step, duration)
+    pushes = _pushes(planted, model, series.period, duration)
+    link_inertia = _link_inertias(model, data, series, iq)
+
+    nv = model.nv
+    start_q, start_v = series.evaluate(np.zeros(1))[0], series.evaluate(np.zeros(1), 1)[0]
+    x, v, a = [0.0] * nv, [0.0] * nv, [0.0] * nv
+    for i in range(n):
+        x[iq[i]], v[iq[i]] = float(start_q[i]), float(start_v[i])
+        if elastic[i]:
+            x[it[i]] = gear[i] * float(theta_reference[0, i])
+            v[it[i]] = gear[i] * float(rate_reference[0, i])
+    for k, i in soft:
+        x[k] = -float(truth.stiffness[i] * (theta_reference[0, i] - start_q[i])) * 0.0
+
+    k1, k3, damping = truth.stiffness.tolist(), truth.cubic.tolist(), truth.damping.tolist()
+    viscous, coulomb = truth.viscous.tolist(), truth.coulomb.tolist()
+    states = [forms.JointState() for _ in range(n)]
+    coupling, net, f_motor, f_link = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
+    jitter, forward = [0.0] * n, [False] * n
+    smoothing, ramp, spread = friction.smoothing, friction.form == "ramp", friction.jitter
+    jitter_speed = friction.jitter_speed
+    half = 0.5 * step
+    qpos, qvel, qacc, applied = data.qpos, data.qvel, data.qacc, data.qfrc_applied
+    forward_dynamics = mujoco.mj_forward
+    count = (total - first) // stride
+    log = np.empty((count, 8, n))
+    range_n = range(n)
+    row = 0
+
+    for step_index in range(total):
+        t = (step_index - first) * step
+        phase = step_index % per_period
+        at = [vi + half * ai for vi, ai in zip(v, a, strict=True)]
+        theta_r, rate_r, torque_r = theta_rows[phase], rate_rows[phase], torque_rows[phase]
+        for i in range_n:
+            s = states[i]
+            s.t, s.k = t, step_index
+            s.q, s.dq = x[iq[i]], at[iq[i]]
+            if elastic[i]:
+                s.th, s.dth = x[it[i]] / gear[i], at[it[i]] / gear[i]
+                s.d = d = s.th - s.q
+                s.dd = s.dth - s.dq
+                ts = k1[i] * d + k3[i] * d * d * d + damping[i] * s.dd
+                for change in hooks[i].spring:
+                    ts = change(s, ts)
+                s.ts = ts
+            else:
+                s.th, s.dth = s.q, s.dq
+                s.ts = s.u - f_motor[i]
+            s.u = torque_r[i] + kp[i] * (theta_r[i] - s.th) + kd[i] * (rate_r[i] - s.dth)
+            if noise_rows is not None:
+                s.u += noise_rows[step_index][i]
+        extra_link, extra_motor = [0.0] * n, [0.0] * n
+        for law in wide:
+            law(states, extra_link, extra_motor)
+        force = [0.0] * nv
+        for i in range_n:
+            s, h = states[i], hooks[i]
+            spring = s.ts if elastic[i] else 0.0
+            b = viscous[i] if h.viscous is None else h.viscous(s, viscous[i])
+            resisting = b * s.dth + extra_motor[i]
+            for smooth in h.smooth:
+                resisting += smooth(s)
+            level = coulomb[i]
+            for change in h.level:
+                level = change(s, level)
+            if spread:
+                moving = s.dth > 0.0
+                if moving is not forward[i]:
+                    forward[i] = moving
+                    jitter[i] = spread * float(rng.standard_normal())
+                level *= max(1.0 + jitter[i] / (1.0 + (s.dth / jitter_speed) ** 2), 0.0)
+            drive = s.u if h.drive is None else h.drive(s, s.u)
+            free = drive - spring - resisting
+            m = inertia[i]
+            if h.bristle is not None:
+                f = h.bristle(s, level)
+            elif level > 0.0:
+                ahead = v[it[i]] / gear[i] + step * (free / m - coupling[i])
+                f = ahead / (smoothing / level + step / m)
+                if f > level:
+                    f = level
+                elif f < -level:
+                    f = -level
+                if not ramp:
+                    w = ahead - step * f / m
+                    for _ in range(4):
+                        bend = tanh(w / smoothing)
+                        w -= (w + step * level / m * bend - ahead) / (
+                            1.0 + step * level / (m * smoothing) * (1.0 - bend * bend)
+                        )
+                    f = level * tanh(w / smoothing)
+            else:
+                f = 0.0
+            f_motor[i] = f + resisting
+            net[i] = free - f
+            force[it[i]] += net[i] / gear[i]
+            push = spring - extra_link[i]
+            for law_at_link in h.link:
+                push -= law_at_link(s)
+            if h.link_coulomb > 0.0:
+                m = link_inertia[i]
+                ahead = v[iq[i]] + step * (a[iq[i]] + f_link[i] / m)
+                c = h.link_coulomb
+                f = ahead / (smoothing / c + step / m)
+                f_link[i] = f = c if f > c else -c if f < -c else f
+                push -= f
+            force[iq[i]] += push
+        for body, vector, on in pushes:
+            data.xfrc_applied[body, :3] = vector if on(t) else 0.0
+        qpos[:] = x
+        qvel[:] = at
+        applied[:] = force
+        forward_dynamics(model, data)
+        a = qacc.tolist()
+        before = v
+        v = [vi + step * ai for vi, ai in zip(v, a, strict=True)]
+        for i in range_n:
+            coupling[i] = net[i] / inertia[i] - a[it[i]] / gear[i]
+        if step_index >= first and (step_index - first) % stride == 0:
+            for i in range_n:
+                s, j, k = states[i], iq[i], it[i]
+                log[row, :, i] = (
+                    s.q, 0.5 * (before[j] + v[j]), a[j], s.th, 0.5 * (before[k] + v[k]) / gear[i], a[k] / gear[i],
+                    s.u, s.ts if elastic[i] else s.u - f_motor[i],
+                )  # fmt: skip
+            row += 1
+        x = [xi + step * vi for xi, vi in zip(x, v, strict=True)]
+    if not np.all(np.isfinite(log)):
+        raise FloatingPointError("the simulation diverged")
+    clock = np.arange(count) * (stride * step)
+    temperature = np.full((count, n), 24.0)
+    for i, h in enumerate(hooks):
+        if h.temperature is not None:
+            temperature[:, i] = [h.temperature(float(value)) for value in clock]
+        else:
+            temperature[:, i] += (6.0 + i) * (1.0 - np.exp(-clock / (0.2 * (i + 2) * duration)))
+    motion = Motion(clock, *(np.ascontiguousarray(log[:, k]) for k in range(6)))
+    return Exact(motion, log[:, 6].copy(), log[:, 7].copy(), temperature)
+
+
+def _structure(
+    planted: tuple[Planted, ...], truth: Truth
+) -> tuple[tuple[Payload, ...], tuple[Flexibility, ...], tuple[Coupling, ...]]:
+    names = truth.robot.joint_names
+    payloads, flexibilities, couplings = [], [], []
+    for p in planted:
+        if p.effect == "payload":
+            payloads.append(Payload(str(p.joint), p.size, (p.shape["x"], p.shape["y"], p.shape["z"])))
+        elif p.effect == "link_flexibility":
+            stiffness = 1.0 / max(p.size, 1e-12)
+            flexibilities.append(Flexibility(str(p.joint), stiffness, p.shape["damping"] * stiffness, p.shape["inertia"]))
+        elif p.effect == "transmission_coupling":
+            couplings.append(Coupling(str(p.joint), names[int(p.shape["other"])], p.shape["ratio"], p.size))
+    return tuple(payloads), tuple(flexibilities), tuple(couplings)
+
+
+def _pushes(planted, model, period, duration):  # type: ignore[no-untyped-def]
+    pushes = []
+    for p in planted:
+        if p.effect != "external_force":
+            continue
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, p.joint)
+        vector = p.size * np.array([p.shape["x"], p.shape["y"], p.shape["z"]])
+        if p.shape["every_period"] > 0.5:
+            begin, end = p.shape["begin"], p.shape["end"]
+            pushes.append((body, vector, lambda t, b=begin, e=end: b <= (t / period) % 1.0 < e))
+        else:
+            begin, end = p.shape["begin"] * duration, p.shape["begin"] * duration + p.shape["length"]
+            pushes.append((body, vector, lambda t, b=begin, e=end: b <= t < e))
+    return pushes
+
+
+def _motor_inertias(model, data, series, iq, it, gear, elastic):  # type: ignore[no-untyped-def]
+    """What a torque at each motor accelerates at least, on the joint side [kg m2]."""
+    smallest = np.full(len(iq), np.inf)
+    full = np.zeros((model.nv, model.nv))
+    for q in series.evaluate(np.linspace(0.0, series.period, 7)):
+        data.qpos[:] = 0.0
+        data.qpos[iq] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, full)
+        inverse = np.linalg.inv(full)
+        smallest = np.minimum(smallest, [gear[i] ** 2 / inverse[k, k] for i, k in enumerate(it)])
+    return [float(m if e else 0.9 * m) for m, e in zip(smallest, elastic, strict=True)]
+
+
+def _link_inertias(model, data, series, iq):  # type: ignore[no-untyped-def]
+    smallest = np.full(len(iq), np.inf)
+    full = np.zeros((model.nv, model.nv))
+    for q in series.evaluate(np.linspace(0.0, series.period, 7)):
+        data.qpos[:] = 0.0
+        data.qpos[iq] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, full)
+        inverse = np.linalg.inv(full)
+        smallest = np.minimum(smallest, [1.0 / inverse[k, k] for k in iq])
+    return [0.8 * float(m) for m in smallest]

@@ -1,0 +1,172 @@
+"""The robot as an MJCF model: links and rotors as bodies, each rotor on a hinge of its carrier."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from sea_ident.robot import Robot
+from tests.benchmarks.hidden_effects.case import FloatArray
+
+ROTOR_MASS_SHARE = 0.03
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A mass fixed to a link.
+
+    Attributes:
+        joint: joint that moves the link.
+        mass: [kg].
+        position: (3,) in the frame of the joint [m].
+    """
+
+    joint: str
+    mass: float
+    position: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Flexibility:
+    """A hinge with a spring between the encoder of a joint and its link, about the joint's axis.
+
+    Attributes:
+        joint: joint.
+        stiffness: [N m/rad].
+        damping: [N m s/rad].
+        inertia: of what turns with the encoder [kg m2].
+    """
+
+    joint: str
+    stiffness: float
+    damping: float
+    inertia: float
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A further rotor that turns with the sum of two motor angles.
+
+    Attributes:
+        first: joint.
+        second: joint.
+        ratio: r in theta_first + r theta_second [-].
+        inertia: reflected to the joint side of the first [kg m2].
+    """
+
+    first: str
+    second: str
+    ratio: float
+    inertia: float
+
+
+def build_mjcf(
+    robot: Robot,
+    timestep: float,
+    payloads: tuple[Payload, ...] = (),
+    flexibilities: tuple[Flexibility, ...] = (),
+    couplings: tuple[Coupling, ...] = (),
+) -> mujoco.MjModel:
+    """Build MuJoCo's model of a robot from the masses, places and axes of its bodies.
+
+    A rotor gets mass and transverse inertia of its own, at the centre of mass of its carrier, and the carrier loses
+    as much, so that the totals are those of `robot`: where that mass sits is no concern of the equations of motion.
+
+    Args:
+        robot: the robot with its true parameters.
+        timestep: [s].
+        payloads: masses to add.
+        flexibilities: flexible links.
+        couplings: rotors that turn with two motors.
+
+    Returns:
+        The model; joint names are those of `robot.extended_model`.
+    """
+    model = robot.extended_model
+    rotors = {int(i): rotor for i, rotor in zip(robot.rotor_indices, robot.rotors, strict=True)}
+    children: dict[int, list[int]] = {k: [] for k in range(model.njoints)}
+    for k in range(1, model.njoints):
+        children[int(model.parents[k])].append(k)
+    flexible = {f.joint: f for f in flexibilities}
+
+    def inertial(mass: float, centre: FloatArray, about_centre: FloatArray) -> str:
+        i = about_centre
+        full = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
+        return f'<inertial mass="{mass!r}" pos="{_text(centre)}" fullinertia="{_text(full)}"/>'
+
+    def axis(k: int) -> tuple[str, FloatArray]:
+        data = model.joints[k].createData()
+        model.joints[k].calc(data, np.zeros(1), np.zeros(1))
+        subspace = np.asarray(data.S).reshape(6)
+        return ("hinge", subspace[3:]) if np.any(subspace[3:]) else ("slide", subspace[:3])
+
+    def link(k: int) -> str:
+        body = model.inertias[k]
+        mass, moments = float(body.mass), body.inertia.copy()
+        carried = [c for c in children[k] if c in rotors]
+        inner = ""
+        for c in carried:
+            spin = float(model.inertias[c].inertia[2, 2])
+            rotation = model.jointPlacements[c].rotation
+            share, transverse = ROTOR_MASS_SHARE * float(body.mass), 0.7 * spin
+            mass -= share
+            moments -= rotation @ np.diag([transverse, transverse, 0.0]) @ rotation.T
+            inner += rotor(c, share, transverse, body.lever)
+        kind, direction = axis(k)
+        own = inertial(mass, body.lever, moments)
+        joint = f'<joint name="{model.names[k]}" type="{kind}" axis="{_text(direction)}"/>'
+        extra = "".join(
+            f'<body pos="{_text(p.position)}"><inertial mass="{p.mass!r}" pos="0 0 0" diaginertia='
+            f'"{p.mass * 4e-4!r} {p.mass * 4e-4!r} {p.mass * 4e-4!r}"/></body>'
+            for p in payloads
+            if p.joint == model.names[k]
+        )
+        rest = own + inner + extra + "".join(link(c) for c in children[k] if c not in rotors)
+        soft = flexible.get(model.names[k])
+        if soft is not None:
+            # what turns with the encoder is a body of its own; the link hangs on it by a second hinge
+            small = np.eye(3) * soft.inertia
+            rest = (
+                inertial(1e-3, np.zeros(3), small)
+                + f'<body name="{model.names[k]} after flexibility"><joint name="{model.names[k]} flexibility" '
+                + f'type="{kind}" axis="{_text(direction)}" stiffness="{soft.stiffness!r}" '
+                + f'damping="{soft.damping!r}"/>{rest}</body>'
+            )
+        return f'<body name="{model.names[k]}" {_place(model.jointPlacements[k])}>{joint}{rest}</body>'
+
+    def rotor(k: int, mass: float, transverse: float, position: FloatArray) -> str:
+        spin = float(model.inertias[k].inertia[2, 2])
+        moments = np.diag([transverse, transverse, spin])
+        placement = pin.SE3(model.jointPlacements[k].rotation, position)
+        joint = f'<joint name="{model.names[k]}" type="hinge" axis="0 0 1"/>'
+        own = inertial(mass, np.zeros(3), moments)
+        return f'<body name="{model.names[k]}" {_place(placement)}>{joint}{own}</body>'
+
+    grounded = "".join(rotor(c, 0.1, 0.7 * float(model.inertias[c].inertia[2, 2]), np.zeros(3))
+                       for c in children[0] if c in rotors)  # fmt: skip
+    world = grounded + "".join(link(c) for c in children[0] if c not in rotors)
+    gears = {rotor.joint: rotor.gear_ratio for rotor in robot.rotors}
+    tendons = "".join(
+        f'<fixed name="{c.first} {c.second}" armature="{c.inertia!r}">'
+        f'<joint joint="{c.first} rotor" coef="{1.0 / gears[c.first]!r}"/>'
+        f'<joint joint="{c.second} rotor" coef="{c.ratio / gears[c.second]!r}"/></fixed>'
+        for c in couplings
+    )
+    gravity = _text(model.gravity.linear)
+    text = (
+        f'<mujoco><compiler angle="radian"/><option timestep="{timestep!r}" gravity="{gravity}" integrator="Euler">'
+        f'<flag contact="disable" constraint="disable"/></option>'
+        f"<worldbody>{world}</worldbody>{f'<tendon>{tendons}</tendon>' if tendons else ''}</mujoco>"
+    )
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def _text(values: object) -> str:
+    return " ".join(repr(float(v)) for v in values)  # type: ignore[attr-defined]
+
+
+def _place(placement: pin.SE3) -> str:
+    quaternion = pin.Quaternion(placement.rotation)
+    turn = (quaternion.w, quaternion.x, quaternion.y, quaternion.z)
+    return f'pos="{_text(placement.translation)}" quat="{_text(turn)}"'
