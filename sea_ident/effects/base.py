@@ -163,16 +163,15 @@ class SimulationState:
     """State of the robot at one instant of a simulation.
 
     Attributes:
-        time: [s].
+        time: from the start of the recording; its start while the motion settles [s].
         q: (n,) link positions.
         dq: (n,) link velocities.
         theta: (n,) motor positions after the gear.
         dtheta: (n,) motor velocities after the gear.
-        tau_spring: (n,) spring torques, 0 at a rigid joint [N m].
+        tau_spring: (n,) torques from the motor side onto the links: of the springs, or at a rigid joint what the
+            bodies need, where a `LoadEffect` asks for it [N m].
         tau_motor: (n,) commanded motor torques at the joint side [N m].
         elapsed: time since the last step that was accepted [s].
-        period_index: number of the recorded period, 0 while settling.
-        temperature: (n,) of the motors, None where the simulation has none [degC].
     """
 
     time: float
@@ -183,8 +182,6 @@ class SimulationState:
     tau_spring: FloatArray
     tau_motor: FloatArray
     elapsed: float = 0.0
-    period_index: int = 0
-    temperature: FloatArray | None = None
 
 
 class Action(Protocol):
@@ -284,10 +281,6 @@ class Effect(ABC):
         of the present state.
         """
         return robot
-
-    def added_inertia(self, robot: Robot, values: FloatArray) -> FloatArray:
-        """(2 n, 2 n) constant symmetric matrix that it adds to the mass matrix over (q'', theta'') [kg m2]."""
-        return np.zeros((2 * robot.n, 2 * robot.n))
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """What the sensors show where the effect sits in a sensor; by default all signals as they are.
