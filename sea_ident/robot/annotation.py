@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError
 from sea_ident.robot.actuator import Actuator, SeriesElasticActuator
 from sea_ident.robot.urdf import MOVING_TYPES, UrdfTree
-from sea_ident.robot.xml import number, vector
+from sea_ident.robot.xml import LARGEST_NUMBER, number, vector
 
 SERIES_ELASTIC = "sea_ident/SeriesElastic"
 LINEAR_LIMIT = "sea_ident/LinearLimit"
@@ -60,7 +60,7 @@ def _text_number(parent: etree._Element, tag: str, where: str, *, positive: bool
         value = float(text)
     except ValueError:
         raise RobotError(f"{where}: <{tag}> holds {text!r}, not a number") from None
-    if not np.isfinite(value) or (positive and value < 0.0):
+    if not abs(value) <= LARGEST_NUMBER or (positive and value < 0.0):
         raise RobotError(f"{where}: <{tag}> is {text}; it must be finite and not negative")
     return value
 

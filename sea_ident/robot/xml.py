@@ -10,6 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError
 
 LARGEST_FILE = 64 * 2**20
+LARGEST_NUMBER = 1e12
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 
 
@@ -56,13 +57,13 @@ def number(element: etree._Element, attribute: str, default: float | None, where
         attribute: name of the attribute.
         default: value where it is missing; None where it must not be missing.
         where: for messages.
-        finite: whether infinity is refused.
+        finite: whether infinity and senseless sizes are refused.
 
     Returns:
         The number, never NaN.
 
     Raises:
-        RobotError: if the attribute is missing without a default, not a number, or not finite.
+        RobotError: if the attribute is missing without a default, not a number, not finite or senselessly large.
     """
     text = element.get(attribute)
     if text is None:
@@ -75,6 +76,8 @@ def number(element: etree._Element, attribute: str, default: float | None, where
         raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not a number") from None
     if isnan(value) or (finite and isinf(value)):
         raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not finite")
+    if finite and abs(value) > LARGEST_NUMBER:
+        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is larger than any robot; check its unit")
     return value
 
 
@@ -91,4 +94,6 @@ def vector(element: etree._Element | None, attribute: str, default: str, where: 
         raise RobotError(f"{where}: {attribute}={text!r} is not three numbers") from None
     if value.shape != (3,) or not np.all(np.isfinite(value)):
         raise RobotError(f"{where}: {attribute}={text!r} is not three finite numbers")
+    if np.any(np.abs(value) > LARGEST_NUMBER):
+        raise RobotError(f"{where}: {attribute}={text!r} is larger than any robot; check its unit")
     return value
