@@ -108,10 +108,10 @@ def write_recording(recording: Recording, path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == "":
-        with atomic_directory(path) as temporary:
+        with atomic_directory(path) as temporary, _named(path):
             _ROS2_BAG.write(recording, temporary)
     elif suffix in _FORMATS:
-        with atomic_file(path) as temporary:
+        with atomic_file(path) as temporary, _named(path):
             _FORMATS[suffix].write(recording, temporary)
     else:
         raise RecordingError(_unknown_suffix(path))
@@ -145,6 +145,15 @@ def _format(path: Path) -> _Format:
     if path.stat().st_size == 0:
         raise RecordingError(f"{path}: the file is empty")
     return _FORMATS[path.suffix.lower()]
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Put the name of the file before an error of a writer, which knows the temporary name only."""
+    try:
+        yield
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from error
 
 
 def _unknown_suffix(path: Path) -> str:

@@ -69,10 +69,10 @@ def write_hdf5(recording: Recording, path: Path) -> None:
     try:
         import h5py
     except ImportError as error:
-        raise MissingExtraError("h5py", "hdf5", f"{path}: writing HDF5") from error
+        raise MissingExtraError("h5py", "hdf5", "writing HDF5") from error
     for name in recording.columns:
         if "/" in name or name == ".":
-            raise RecordingError(f"{path}: column {name!r} cannot name an HDF5 dataset; choose another format")
+            raise RecordingError(f"column {name!r} cannot name an HDF5 dataset; choose another format")
     with h5py.File(path, "w", track_order=True) as root:
         for name, values in {TIME: recording.time, **recording.columns}.items():
             dataset = root.create_dataset(name, data=values, compression="gzip", shuffle=True, fletcher32=True)

@@ -89,7 +89,7 @@ def write_mat(recording: Recording, path: Path) -> None:
     for name in recording.columns:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or len(name) > _LONGEST_NAME:
             raise RecordingError(
-                f"{path}: column {name!r} is no name for a MATLAB variable (a letter, then up to 62 letters, "
+                f"column {name!r} is no name for a MATLAB variable (a letter, then up to 62 letters, "
                 "digits or _); choose another format"
             )
     variables = {TIME: recording.time, **recording.columns}

@@ -71,7 +71,7 @@ def write_parquet(recording: Recording, path: Path) -> None:
         import pyarrow
         import pyarrow.parquet as parquet
     except ImportError as error:
-        raise MissingExtraError("pyarrow", "parquet", f"{path}: writing Parquet") from error
+        raise MissingExtraError("pyarrow", "parquet", "writing Parquet") from error
     table = pyarrow.table({TIME: recording.time, **recording.columns})
     parquet.write_table(table, path, write_page_checksum=True)
 

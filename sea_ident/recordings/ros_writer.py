@@ -35,11 +35,11 @@ def write_ros1_bag(recording: Recording, path: Path) -> None:
         RecordingError: times that stamps cannot hold.
         MissingExtraError: rosbags is not installed.
     """
-    store = message_types(1, f"{path}: writing ROS bags")
+    store = message_types(1, "writing ROS bags")
     from rosbags.rosbag1 import Writer
 
     with Writer(path) as writer:
-        _write(recording, writer, store, store.serialize_ros1, path)
+        _write(recording, writer, store, store.serialize_ros1)
 
 
 def write_ros2_bag(recording: Recording, path: Path, storage: Storage = "mcap") -> None:
@@ -54,19 +54,19 @@ def write_ros2_bag(recording: Recording, path: Path, storage: Storage = "mcap") 
         RecordingError: times that stamps cannot hold.
         MissingExtraError: rosbags is not installed.
     """
-    store = message_types(2, f"{path}: writing ROS bags")
+    store = message_types(2, "writing ROS bags")
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
     with Writer(path, version=8, storage_plugin=plugin) as writer:
-        _write(recording, writer, store, store.serialize_cdr, path)
+        _write(recording, writer, store, store.serialize_cdr)
 
 
-def _write(recording: Recording, writer: Any, store: Any, serialize: Any, path: Path) -> None:
+def _write(recording: Recording, writer: Any, store: Any, serialize: Any) -> None:
     stamps = np.round(recording.time * 1e9)
     if recording.time[0] < 0.0 or recording.time[-1] > _LATEST_STAMP:
         raise RecordingError(
-            f"{path}: time runs from {recording.time[0]:g} s to {recording.time[-1]:g} s, but stamps run from 0 to "
+            f"time runs from {recording.time[0]:g} s to {recording.time[-1]:g} s, but stamps run from 0 to "
             f"{_LATEST_STAMP} s; write another format, or shift time"
         )
     rest = dict(recording.columns)
@@ -75,7 +75,7 @@ def _write(recording: Recording, writer: Any, store: Any, serialize: Any, path: 
         joints = [parts[1] for parts in map(split_name, recording.columns) if parts and parts[0] == kinds[0]]
         if joints:
             arrays = [_all_joints(rest, kind, joints) for kind in kinds]
-            topics.append((topic, JOINT_STATE, _joint_states(store, joints, arrays)))
+            topics.append((topic, JOINT_STATE, _joint_states(joints, arrays)))
     if rest:
         topics.append((CHANNELS_TOPIC, DYNAMIC_JOINT_STATE, _channels(store, rest)))
     streams = [(writer.add_connection(topic, kind, typestore=store), kind, parts) for topic, kind, parts in topics]
@@ -97,7 +97,7 @@ def _all_joints(rest: dict[str, Any], kind: str, joints: list[str]) -> Any:
     return np.column_stack([rest.pop(name) for name in names])
 
 
-def _joint_states(store: Any, joints: list[str], arrays: list[Any]) -> Iterator[dict[str, Any]]:
+def _joint_states(joints: list[str], arrays: list[Any]) -> Iterator[dict[str, Any]]:
     empty = np.empty(0)
     position, velocity, effort = arrays
     for k in range(len(position)):

@@ -14,10 +14,8 @@ import time
 import warnings
 from pathlib import Path
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parents[1] / "recordings"))
-from damage import SUFFIXES, damage, write_sample
+from damage import SUFFIXES, damaged, write_sample
 
 from sea_ident.exceptions import SeaIdentError
 from sea_ident.recordings import read_recording
@@ -30,11 +28,11 @@ SECONDS = 60
 def read_damaged(suffix: str, seeds: range, folder: str, progress) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
     warnings.simplefilter("ignore")
-    name = suffix.removeprefix(".73")
+    name = "." + suffix.split(".")[-1]
     valid = (Path(folder) / f"valid{suffix}").read_bytes()
     path = Path(folder) / f"damaged{seeds.start}{name}"
     for seed in seeds:
-        path.write_bytes(damage(valid, np.random.default_rng(seed)))
+        path.write_bytes(damaged(suffix, valid, seed))
         start = time.perf_counter()
         try:
             read_recording(path, memory_limit=MEMORY_LIMIT)
@@ -72,7 +70,8 @@ def fuzz(suffix: str, count: int, first: int, folder: str) -> None:
             done += 1
     other = [outcome for outcome in outcomes if outcome not in ("read", "refused")]
     print(
-        f"{suffix:9s} {len(outcomes):6d} files: {outcomes.count('read'):5d} read, {outcomes.count('refused'):5d} refused, "
+        f"{suffix:11s}{len(outcomes):6d} files: {outcomes.count('read'):5d} read, "
+        f"{outcomes.count('refused'):5d} refused, "
         f"{len(other)} other exceptions, {len(died)} ended the process, slowest {slowest:.2f} s, peak {peak:.0f} MiB",
         flush=True,
     )

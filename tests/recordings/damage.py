@@ -1,14 +1,19 @@
 """Valid recordings of every format, and random damage to them, for tests that no file breaks a reader."""
 
+import io
+import zipfile
 from pathlib import Path
 
 import h5py
 import numpy as np
+import scipy.io
 
 from sea_ident.recordings import Recording, write_recording
 from sea_ident.recordings.naming import TIME
 
-SUFFIXES = (".csv", ".npz", ".mat", ".73.mat", ".parquet", ".h5", ".bag", ".mcap", ".db3")
+SUFFIXES = (".csv", ".npz", ".inner.npz", ".mat", ".plain.mat", ".4.mat", ".73.mat", ".parquet", ".h5")
+SUFFIXES += (".bag", ".mcap", ".db3")
+"""Formats; inner: damaged inside the archive, whose checksums are right again; plain: not compressed."""
 
 
 def sample_recording(samples: int = 40, seed: int = 0) -> Recording:
@@ -33,11 +38,32 @@ def write_mat73(recording: Recording, path: Path) -> None:
 def write_sample(suffix: str, path: Path, samples: int = 40) -> bytes:
     """Write a valid recording of a format and return its bytes."""
     recording = sample_recording(samples)
+    variables = {TIME: recording.time, **recording.columns}
     if suffix == ".73.mat":
         write_mat73(recording, path)
+    elif suffix in (".plain.mat", ".4.mat"):
+        scipy.io.savemat(path, variables, format=suffix[1] if suffix == ".4.mat" else "5")
     else:
         write_recording(recording, path)
     return path.read_bytes()
+
+
+def damage_inside(data: bytes, rng: np.random.Generator) -> bytes:
+    """Damage one array in an archive, and pack it again."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(packed, "w") as new:
+        members = old.namelist()
+        chosen = members[int(rng.integers(3))]
+        for name in members:
+            part = old.read(name)
+            new.writestr(name, damage(part, rng) if name == chosen else part)
+    return packed.getvalue()
+
+
+def damaged(suffix: str, data: bytes, seed: int) -> bytes:
+    """Damage a valid file of a format."""
+    rng = np.random.default_rng(seed)
+    return damage_inside(data, rng) if suffix == ".inner.npz" else damage(data, rng)
 
 
 def damage(data: bytes, rng: np.random.Generator) -> bytes:
