@@ -8,11 +8,18 @@ from scipy.linalg.lapack import dposv, dpotrf, dpotrs
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import SimulationError
+from sea_ident.robot.model import rotor_body
 from sea_ident.simulation.controller import Drive
 from sea_ident.simulation.friction import JointFriction
 from sea_ident.simulation.plant import Plant
-from sea_ident.simulation.planted import PlantedTorques
+from sea_ident.simulation.planted import PlantedTorques, motor_coordinates
 from sea_ident.simulation.rosenbrock import RosenbrockW
+
+LOAD_ROUNDS = 3
+"""An effect takes a few percent of the load, so that a round leaves a few percent of the error: here of one step."""
+
+LOAD_ROUNDS_EXACT = 60
+"""Until nothing changes any more; for what is recorded."""
 
 
 class ClosedLoop:
@@ -36,9 +43,7 @@ class ClosedLoop:
         self.plant, self.step_size, self.planted = plant, step, planted
         self.n = n = robot.n
         self.elastic = [int(i) for i in robot.elastic_indices]
-        self.motor = list(range(n))  # coordinate of each motor
-        for k, i in enumerate(self.elastic):
-            self.motor[i] = n + k
+        self.motor = motor_coordinates(robot)
         self.size = size = n + len(self.elastic)
         self._map = np.zeros((robot.extended_model.nv, size))
         self._map[:, :n] = robot.link_map
@@ -48,12 +53,19 @@ class ClosedLoop:
         self._offset = robot.offset
         self._model = robot.extended_model
         self._data = robot.extended_model.createData()
-        self._added_inertia = None if planted is None else planted.added_inertia(size)
 
         self._inverse: FloatArray | None = None
-        if len(self._map) == size and self._added_inertia is None and np.linalg.matrix_rank(self._map) == size:
+        if len(self._map) == size and np.linalg.matrix_rank(self._map) == size:
             self._inverse = np.linalg.inv(self._map)
             self._inverse_t = np.ascontiguousarray(self._inverse.T)
+
+        self._bodies: pin.Model | None = None
+        if planted is not None and planted.needs_load:
+            self._bodies = pin.Model(self._model)
+            for index in robot.rotor_indices:
+                self._bodies.inertias[int(index)] = rotor_body(0.0)
+            self._bodies_data = self._bodies.createData()
+        self._load = [0.0] * n
 
         self.link_friction = list(link_friction)
         kp, kd = drive.position_gain.tolist(), drive.velocity_gain.tolist()
@@ -111,6 +123,7 @@ class ClosedLoop:
                 out[m] = torque - spring
                 out[i] = spring if link_friction is None else spring - link_friction(q, dq)
             else:
+                tau_spring[i] = self._load[i]
                 out[i] = torque
         if self.planted is not None:
             self.planted.add(time, elapsed, u, w, tau_motor, tau_spring, out)
@@ -118,7 +131,9 @@ class ClosedLoop:
 
     def evaluate(self, time: float, bias: list[float], y: FloatArray) -> None:
         """Torques and `acceleration` at a state (2 size,) that was reached by accepted steps."""
-        self.acceleration = self._acceleration(time, 0.0, bias, y[: self.size], y[self.size :])
+        u, w = y[: self.size], y[self.size :]
+        self._find_load(time, 0.0, bias, u, w, LOAD_ROUNDS_EXACT)
+        self.acceleration = self._acceleration(time, 0.0, bias, u, w)
 
     def check_mass(self, y: FloatArray) -> None:
         """Refuse a state in which the mass matrix is not positive definite.
@@ -128,8 +143,6 @@ class ClosedLoop:
         """
         u = y[: self.size]
         mass = self._map_t @ pin.crba(self._model, self._data, self._map @ u + self._offset) @ self._map
-        if self._added_inertia is not None:
-            mass += self._added_inertia
         if dpotrf(mass)[1] != 0:
             raise SimulationError(self._not_positive(u))
 
@@ -160,6 +173,7 @@ class ClosedLoop:
         size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
         u, w = y[:size], y[size:]
         u_list, w_list = u.tolist(), w.tolist()
+        self._find_load(time, 0.0, biases[0], u, w, LOAD_ROUNDS)
         mass, force = self._mass_and_force(time, 0.0, biases[0], u, w, u_list, w_list)
         stiffness, damping = self._jacobian(time, u_list, w_list)
         stiffness *= hgamma
@@ -173,6 +187,7 @@ class ClosedLoop:
                 shift, coupling = self._combine[i].dot(increments[:i])
                 stage = y + shift
                 u, w = stage[:size], stage[size:]
+                self._find_load(time + elapsed[i], elapsed[i], biases[i], u, w, LOAD_ROUNDS)
                 acceleration = self._acceleration(time + elapsed[i], elapsed[i], biases[i], u, w)
                 rate = w + coupling[:size]
                 rhs = mass.dot(acceleration + coupling[size:]) - stiffness.dot(rate)
@@ -182,6 +197,20 @@ class ClosedLoop:
             row[:size] = hgamma * (rate + change)
         result: FloatArray = y + self._weights.dot(increments)
         return result
+
+    def _find_load(
+        self, time: float, elapsed: float, bias: list[float], u: FloatArray, w: FloatArray, rounds: int
+    ) -> None:
+        """What the bodies need at rigid joints, where an effect asks for it: it depends on the acceleration."""
+        if self._bodies is None:
+            return
+        x, v = self._map.dot(u) + self._offset, self._map.dot(w)
+        for _ in range(rounds):
+            acceleration = self._map.dot(self._acceleration(time, elapsed, bias, u, w))
+            load = self._map_t.dot(pin.rnea(self._bodies, self._bodies_data, x, v, acceleration))[: self.n].tolist()
+            if load == self._load:
+                return
+            self._load = load
 
     def _acceleration(self, time: float, elapsed: float, bias: list[float], u: FloatArray, w: FloatArray) -> FloatArray:
         """(size,) accelerations at a trial state."""
@@ -212,8 +241,6 @@ class ClosedLoop:
         force = np.array(self.forces(time, elapsed, bias, u_list, w_list))
         force -= self._map_t.dot(pin.nonLinearEffects(self._model, self._data, x, self._map.dot(w)))
         mass: FloatArray = self._map_t.dot(pin.crba(self._model, self._data, x)).dot(self._map)
-        if self._added_inertia is not None:
-            mass += self._added_inertia
         return mass, force
 
     def _jacobian(self, time: float, u: list[float], w: list[float]) -> tuple[FloatArray, FloatArray]:

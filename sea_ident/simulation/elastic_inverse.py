@@ -33,7 +33,7 @@ def deflection_of(plant: Plant, tau_spring: FloatArray) -> FloatArray:
     elastic = plant.robot.elastic_indices
     k1, k3 = plant.stiffness[elastic], plant.cubic_stiffness[elastic]
     torque: FloatArray = tau_spring[:, elastic]
-    d = np.zeros_like(torque)
+    d: FloatArray = np.zeros_like(torque)
     # From zero, Newton on a stiffening spring may overshoot once and then falls monotonically.
     for _ in range(60):
         d = d - (k1 * d + k3 * d**3 - torque) / np.maximum(k1 + 3.0 * k3 * d * d, 1e-3 * k1)
@@ -57,7 +57,7 @@ def link_position_at_rest(plant: Plant, theta: FloatArray) -> FloatArray:
         link, _ = inverse_dynamics(plant.robot, motion)
         updated = theta - deflection_of(plant, link)[0]
         if float(np.max(np.abs(updated - q))) < 1e-12:
-            return updated
+            return np.asarray(updated, dtype=np.float64)
         q = 0.5 * (q + updated)
     return q
 

@@ -1,14 +1,18 @@
 """Planted effects in a running simulation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, Side, SimulationState
+from sea_ident.effects.load import LoadEffect
 from sea_ident.exceptions import SimulationError
 from sea_ident.robot import Robot
 from sea_ident.simulation.plant import PlantedEffect
+
+SMALL_SPEED = 1e-3
+"""Speed over which slopes are taken [rad/s] or [m/s]: coarse enough to see a smoothed sign as steep."""
 
 
 def overrides(effect: Effect, hook: str) -> bool:
@@ -16,44 +20,34 @@ def overrides(effect: Effect, hook: str) -> bool:
     return getattr(type(effect), hook) is not getattr(Effect, hook)
 
 
+def motor_coordinates(robot: Robot) -> list[int]:
+    """(n,) coordinate of each motor in u = (q, theta of the elastic joints)."""
+    motors = list(range(robot.n))
+    for k, i in enumerate(robot.elastic_indices):
+        motors[int(i)] = robot.n + k
+    return motors
+
+
 class PlantedTorques:
     """Torques of effects that act on the present state, with or without memory.
 
     Coordinates are those of `ClosedLoop`: u = (q, theta of the elastic joints).
+
+    Attributes:
+        needs_load: whether an effect asks for the load of a rigid joint.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        effects: Sequence[PlantedEffect],
-        begin: float,
-        period: float,
-        temperature: Callable[[float], FloatArray] | None,
-    ) -> None:
-        self._robot, self._temperature = robot, temperature
-        self._begin, self._period = begin, period
-        self._motor = np.arange(robot.n)
-        self._motor[robot.elastic_indices] = robot.n + np.arange(len(robot.elastic_indices))
-        self._effects = tuple(effects)
+    def __init__(self, robot: Robot, effects: Sequence[PlantedEffect], begin: float) -> None:
+        self._n, self._begin = robot.n, begin
+        self._motor = np.array(motor_coordinates(robot), dtype=np.intp)
         acting = [p for p in effects if overrides(p.effect, "torque")]
         hooks = [(p.effect.side is Side.SPRING, p.effect.torque(robot, p.values)) for p in acting]
         # Springs first: the others may depend on the torque that they transmit.
         self._springs = [hook for spring, hook in hooks if spring]
         self._others = [hook for spring, hook in hooks if not spring]
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
-
-    def added_inertia(self, size: int) -> FloatArray | None:
-        """(size, size) what effects add to the mass matrix, None where none does."""
-        adding = [p for p in self._effects if overrides(p.effect, "added_inertia")]
-        parts = [p.effect.added_inertia(self._robot, p.values) for p in adding]
-        if not parts:
-            return None
-        n = self._robot.n
-        select = np.zeros((2 * n, size))
-        select[np.arange(n), np.arange(n)] = 1.0
-        select[n + np.arange(n), self._motor] = 1.0
-        total: FloatArray = select.T @ sum(parts) @ select
-        return total
+        rigid = {joint.name for joint in robot.joints if not joint.elastic}
+        self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
 
     def _state(
         self,
@@ -64,10 +58,10 @@ class PlantedTorques:
         tau_motor: list[float],
         tau_spring: list[float],
     ) -> SimulationState:
-        n, motor = self._robot.n, self._motor
+        n, motor = self._n, self._motor
         position, velocity = np.array(u), np.array(w)
         return SimulationState(
-            time=time,
+            time=max(time, self._begin),
             q=position[:n],
             dq=velocity[:n],
             theta=position[motor],
@@ -75,8 +69,6 @@ class PlantedTorques:
             tau_spring=np.array(tau_spring),
             tau_motor=np.array(tau_motor),
             elapsed=elapsed,
-            period_index=max(0, int(np.floor((time - self._begin) / self._period + 1e-9))),
-            temperature=None if self._temperature is None else self._temperature(time),
         )
 
     def add(
@@ -90,8 +82,7 @@ class PlantedTorques:
         out: list[float],
     ) -> None:
         """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
-        n = self._robot.n
-        link, motor = np.zeros(n), np.zeros(n)
+        link, motor = np.zeros(self._n), np.zeros(self._n)
         state = self._state(time, elapsed, u, w, tau_motor, tau_spring)
         for act in self._springs:
             act(state, link, motor)
@@ -115,13 +106,12 @@ class PlantedTorques:
         damping: FloatArray,
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
-        n, motor = self._robot.n, self._motor.tolist()
+        n, motor = self._n, self._motor.tolist()
         base = self._forces(time, u, w, tau_motor, tau_spring)
-        small = 1e-3
         for side in (range(n), [m for i, m in enumerate(motor) if m != i]):
             moved = list(w)
             for k in side:
-                moved[k] += small if moved[k] >= 0.0 else -small
+                moved[k] += SMALL_SPEED if moved[k] >= 0.0 else -SMALL_SPEED
             changed = self._forces(time, u, moved, tau_motor, tau_spring)
             for k in side:
                 slope = (base[k] - changed[k]) / (moved[k] - w[k])
@@ -146,7 +136,7 @@ class PlantedTorques:
 
 
 def altered_robot(robot: Robot, effects: Sequence[PlantedEffect]) -> Robot:
-    """The robot after the effects that change its bodies or gravity."""
+    """The robot after the effects that change its bodies, its couplings or gravity."""
     for planted in effects:
         robot = planted.effect.modified(robot, planted.values)
     return robot
@@ -163,7 +153,7 @@ def check_planted(robot: Robot, effects: Sequence[PlantedEffect]) -> None:
         if np.shape(planted.values) != (len(columns),):
             raise SimulationError(
                 f"the effect {effect.name!r} has {len(columns)} parameters "
-                f"({', '.join(c.name for c in columns)}), {np.shape(planted.values)} values were given"
+                f"({', '.join(c.name for c in columns)}); {np.shape(planted.values)} values were given"
             )
-        if not any(overrides(effect, hook) for hook in ("torque", "measured", "modified", "added_inertia")):
+        if not any(overrides(effect, hook) for hook in ("torque", "measured", "modified")):
             raise SimulationError(f"the effect {effect.name!r} has no way to act in a simulation")

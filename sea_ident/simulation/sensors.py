@@ -133,7 +133,6 @@ def sensed_columns(
     signals: Mapping[str, FloatArray],
     sensors: SensorNoise,
     seed: np.random.SeedSequence,
-    temperature: FloatArray | None,
 ) -> dict[str, FloatArray]:
     """Columns of the recording.
 
@@ -141,10 +140,9 @@ def sensed_columns(
         plant: the plant.
         time: (N,) [s].
         dtheta: (N, n) exact motor velocities, which the efficiency depends on [rad/s].
-        signals: (N, n) q, theta, tau_motor and tau_spring, after the effects in the signal chain.
+        signals: (N, n) q, theta, tau_motor, tau_spring and possibly temperature, after the effects in the signal chain.
         sensors: noise and resolution.
         seed: of the noise.
-        temperature: (N, n) exact temperatures, None where they are not recorded [degC].
 
     Returns:
         Column name -> (N,) samples: q, theta (elastic joints), current or tau_motor, tau_spring (elastic joints),
@@ -177,7 +175,7 @@ def sensed_columns(
     if sensors.spring_torque is not None:
         spring = read("spring_torque", signals["tau_spring"], correlation)
         columns |= {f"tau_spring_{joint.name}": spring[:, i] for i, joint in enumerate(robot.joints) if joint.elastic}
-    if temperature is not None:
-        measured = read("temperature", temperature)
+    if "temperature" in signals:
+        measured = read("temperature", signals["temperature"])
         columns |= {f"temperature_{name}": measured[:, i] for i, name in enumerate(robot.joint_names)}
     return columns

@@ -114,10 +114,7 @@ def simulate(
             laws, plant.link_viscous_friction, plant.link_coulomb_friction, state[: robot.n], robot.elastic, strict=True
         )
     ]
-    planted = None
-    if effects:
-        temperature = None if warm_up is None else (lambda time: warm_up.at(time, robot.n))
-        planted = PlantedTorques(plant.robot, effects, follow.begin, clock.duration, temperature)
+    planted = PlantedTorques(plant.robot, effects, follow.begin) if effects else None
     system = ClosedLoop(plant, drive, motors, links, planted, method, clock.step)
     system.check_mass(state)
     system.accept(follow.begin - clock.duration, state)
@@ -149,12 +146,11 @@ def simulate(
     # -- what the sensors saw
     motion, tau_motor, tau_spring = passes.motion(), passes.tau_motor, passes.tau_spring
     signals = {"q": motion.q, "theta": motion.theta, "tau_motor": tau_motor, "tau_spring": tau_spring}
+    if warm_up is not None:
+        signals["temperature"] = warm_up.at(motion.time, robot.n)
     for each in effects:
-        signals = each.effect.measured(robot, motion.time, signals)
-    temperatures = None if warm_up is None else warm_up.at(motion.time, robot.n)
-    columns = sensed_columns(
-        plant, motion.time, motion.dtheta, signals, sensors or SensorNoise(), streams[1], temperatures
-    )
+        signals = each.effect.measured(plant.robot, motion.time, signals)
+    columns = sensed_columns(plant, motion.time, motion.dtheta, signals, sensors or SensorNoise(), streams[1])
     reference_motion = _sampled(drive.reference, motion.time, clock, len(method.nodes))
     for i, joint in enumerate(robot.joints):
         kind, values = ("theta", reference_motion.theta) if joint.elastic else ("q", reference_motion.q)
