@@ -8,7 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.estimation import Model
 from sea_ident.exceptions import RecordingError
-from sea_ident.processing import ProcessedRecording, process
+from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
 
 
@@ -90,6 +90,9 @@ def validate(
     """
     if isinstance(recording, ProcessedRecording):
         processed = recording
+    elif all(recording.has("external_force", joint) for joint in model.robot.joint_names):
+        # what pushes differs from period to period: an average would mix pushed with free samples
+        processed = filter_recording(recording, model.robot)
     else:
         processed = process(
             recording, model.robot, period=period, link_harmonics=link_harmonics, motor_harmonics=motor_harmonics

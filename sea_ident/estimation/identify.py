@@ -11,6 +11,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
 from sea_ident.effects import Effect, base_effects
 from sea_ident.effects.base import Side
+from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.estimation.estimators import Estimate, Estimator, PerSampleWLS
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
@@ -26,6 +27,9 @@ from sea_ident.robot import Robot
 
 VISIBLE = 1e-7
 """Singular values of the column-normalised regressor below this share of the largest tell nothing."""
+
+SLOW = 0.01
+"""v_off of Coulomb friction as a share of the largest speed, at joints where the usual v_off is more than 5 % of it."""
 
 EXCERPT = 500
 """Samples of the mean period that a model keeps."""
@@ -73,7 +77,7 @@ def identify(
             f"{processed.source} was processed for the joints {', '.join(processed.joint_names)}; {robot.name} has "
             f"{', '.join(robot.joint_names)}"
         )
-    chosen = tuple(base_effects(robot) if effects is None else effects)
+    chosen = default_effects(robot, processed) if effects is None else tuple(effects)
     _refuse_springs(robot, chosen)
     how = PerSampleWLS() if estimator is None else estimator
     found: list[str] = list(processed.warnings)
@@ -93,6 +97,26 @@ def identify(
     for text in found[first:]:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return replace(model, warnings=tuple(dict.fromkeys(found)), notes=(*processed.notes, *estimate.notes))
+
+
+def default_effects(robot: Robot, processed: ProcessedRecording) -> tuple[Effect, ...]:
+    """Bodies, rotors, viscous and Coulomb friction, with v_off small against the speeds of the recording.
+
+    Args:
+        robot: the robot.
+        processed: the recording.
+
+    Returns:
+        The effects.
+    """
+    found: list[Effect] = []
+    for effect in base_effects(robot):
+        if isinstance(effect, CoulombFriction):
+            fastest = float(np.abs(processed.motion.dtheta[:, robot.index(effect.required_joint)]).max())
+            if 0.0 < 5.0 * SLOW * fastest < effect.smoothing:
+                effect = replace(effect, smoothing=float(f"{SLOW * fastest:.2g}"))
+        found.append(effect)
+    return tuple(found)
 
 
 def visible_parameters(

@@ -54,6 +54,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "kind": str(model.uncertainty.kind),
             "degrees_of_freedom": _number(model.uncertainty.degrees_of_freedom),
             "influences": model.uncertainty.influences.tolist(),
+            "repeatability": model.uncertainty.repeatability.tolist(),
         },
         "base_parameters": [
             {
@@ -198,6 +199,7 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
             degrees_of_freedom=math.inf if freedom is None else float(freedom),
             kind=CovarianceKind(uncertainty["kind"]),
             influences=influences,
+            repeatability=_array(uncertainty["repeatability"], (rank, rank), "uncertainty.repeatability"),
         ),
         information=_array(record["information"], (rank, rank), "information"),
         estimator=str(record["estimator"]),

@@ -5,10 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Effect
+from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
 from sea_ident.regressor import build_regressor
@@ -16,6 +19,9 @@ from sea_ident.robot import Robot
 
 CHUNK = 1000
 """Samples of which the regressor is held at once."""
+
+REVERSAL = 2.0
+"""Speed, in v_off, below which Coulomb friction is not modelled (paper, eq. 3)."""
 
 
 def base_rows(
@@ -72,6 +78,27 @@ class Observations:
         """(P, N, n, b) regressor of the motion of every period; empty where only one is there."""
         parts = [base_rows(self.robot, self.effects, self.base, motion) for motion in self.processed.period_motions]
         return np.stack(parts) if parts else np.zeros((0, *self.rows.shape))
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """(N, n) where the friction model claims to hold: not while a joint with Coulomb friction is close to rest.
+
+        tanh(v / v_off) stands for the sign above 2 v_off (paper, eq. 3); below, friction is anything up to breakaway.
+        """
+        motion = self.processed.motion
+        valid = np.ones(motion.q.shape, dtype=bool)
+        for effect in self.effects:
+            if isinstance(effect, CoulombFriction):
+                joint, speed = effect.required_joint, motion.dtheta
+            elif isinstance(effect, LinkFriction):
+                joint, speed = effect.required_joint, motion.dq
+            else:
+                continue
+            index = self.robot.index(joint)
+            moving = np.abs(speed[:, index]) > REVERSAL * effect.smoothing
+            if np.any(moving):
+                valid[:, index] &= moving
+        return valid
 
     def residual(self, values: FloatArray) -> FloatArray:
         """(N, n) torque less what the parameters (b,) explain [N m] or [N]."""

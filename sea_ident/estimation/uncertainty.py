@@ -11,11 +11,17 @@ from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators import Estimate
 from sea_ident.estimation.observations import Observations
 
+FEWEST_BLOCKS = 20
+"""Smallest number of pieces of a period from which a covariance is estimated."""
+
 FEW_PERIODS = 6
 """Below this number of periods the spread of whole periods says too little about a variance."""
 
 BLOCK = 1.0
 """Length of the pieces into which few periods are cut [s]."""
+
+MISFIT = 1.5
+"""Energy of the mean residual over that of its noise from which on the model is taken to lack something."""
 
 
 class CovarianceKind(StrEnum):
@@ -24,6 +30,7 @@ class CovarianceKind(StrEnum):
     PERIODS = "spread between periods"
     BLOCKS = "spread between periods, piece by piece"
     RESIDUAL = "correlated residual"
+    REMAINDER = "spread between periods and correlated residual"
     MODEL = "model of white torque noise"
 
 
@@ -36,6 +43,7 @@ class Uncertainty:
         degrees_of_freedom: of the variances, for Student's quantiles; infinite where they are taken as known.
         kind: where it comes from.
         influences: (P, b) influence of every period on the estimate, its sum zero; empty where there are no periods.
+        repeatability: (b, b) part of the covariance that is seen when the experiment is repeated.
         warnings: disagreement with the model-based covariance and the like.
     """
 
@@ -43,6 +51,7 @@ class Uncertainty:
     degrees_of_freedom: float
     kind: CovarianceKind
     influences: FloatArray
+    repeatability: FloatArray
     warnings: tuple[str, ...] = ()
 
     @property
@@ -85,7 +94,8 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
             "one stretch of data only: standard deviations rest on the correlation of the residual, which cannot tell "
             "noise from model error"
         )
-        return Uncertainty(covariance, np.inf, CovarianceKind.RESIDUAL, np.zeros((0, len(estimate.values))), (text,))
+        none = np.zeros((0, len(estimate.values)))
+        return Uncertainty(covariance, np.inf, CovarianceKind.RESIDUAL, none, covariance, (text,))
     residuals = observations.period_residuals(estimate.values)
     residuals -= residuals.mean(axis=0)
     periods = len(residuals)
@@ -96,7 +106,35 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
     else:
         covariance, freedom = _from_blocks(observations, estimate, residuals)
         kind = CovarianceKind.BLOCKS
-    return Uncertainty(covariance, freedom, kind, influences, _disagreement(observations, estimate, covariance))
+    found = _disagreement(observations, estimate, covariance)
+    misfit, text = _misfit(observations, estimate, residuals)
+    if misfit is None:
+        return Uncertainty(covariance, freedom, kind, influences, covariance, found)
+    return Uncertainty(covariance + misfit, freedom, CovarianceKind.REMAINDER, influences, covariance, (*found, text))
+
+
+def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray | None, str]:
+    """Covariance from the part of the mean residual that repeats in every period, so is no noise.
+
+    It is treated as a random error with the correlation that the residual shows along the period: that is what an
+    interval can say of a model error that nobody has named.
+    """
+    mean = observations.residual(estimate.values)
+    periods = len(residuals)
+    noise = (residuals**2).sum(axis=0) / (periods * (periods - 1.0))
+    noise_energy, energy = (estimate.weights * noise).sum(axis=0), (estimate.weights * mean**2).sum(axis=0)
+    ratio = energy / np.maximum(noise_energy, 1e-300)
+    large = ratio > MISFIT
+    if not np.any(large) or noise_energy.max() <= 0.0:
+        return None, ""
+    beyond = mean * np.sqrt(np.where(large, 1.0 - 1.0 / ratio, 0.0))
+    names = observations.robot.joint_names
+    parts = ", ".join(f"{names[i]} {ratio[i] ** 0.5:.2g} times" for i in np.flatnonzero(large))
+    text = (
+        f"the residual of the mean is larger than its noise ({parts}): the model lacks something. Standard deviations "
+        "count this as random; diagnose tells what it is"
+    )
+    return _scores(observations, estimate, beyond), text
 
 
 def _disagreement(observations: Observations, estimate: Estimate, covariance: FloatArray) -> tuple[str, ...]:
@@ -117,7 +155,8 @@ def _disagreement(observations: Observations, estimate: Estimate, covariance: Fl
 
 def _block_count(observations: Observations) -> int:
     samples = observations.processed.samples
-    return int(np.clip(samples * observations.processed.interval / BLOCK, 1, max(samples // 4, 1)))
+    count = max(samples * observations.processed.interval / BLOCK, FEWEST_BLOCKS)
+    return int(np.clip(count, 1, max(samples // 4, 1)))
 
 
 def _from_blocks(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray, float]:
@@ -144,24 +183,30 @@ def _from_blocks(observations: Observations, estimate: Estimate, residuals: Floa
 
 
 def _from_residual(observations: Observations, estimate: Estimate) -> FloatArray:
-    """Without periods: scores of the residual, summed over pieces, with Bartlett weights between neighbours."""
-    residual = observations.residual(estimate.values)
+    """Without periods: the residual takes the place of the noise, at least as large as white noise would be."""
+    covariance = _scores(observations, estimate, observations.residual(estimate.values))
+    low = np.diag(covariance) < np.diag(estimate.covariance)
+    if np.any(low):
+        if np.any(np.diag(covariance) <= 0.0):
+            return estimate.covariance
+        scale = np.where(low, np.sqrt(np.diag(estimate.covariance) / np.diag(covariance)), 1.0)
+        covariance = covariance * np.outer(scale, scale)
+    return np.asarray(covariance, dtype=np.float64)
+
+
+def _scores(observations: Observations, estimate: Estimate, residual: FloatArray) -> FloatArray:
+    """(b, b) covariance from the scores of a residual (N, n) summed over pieces, with Bartlett weights between them."""
     samples = len(residual)
     edges = np.linspace(0, samples, _block_count(observations) + 1).astype(int)
     scores = np.stack([np.einsum("kn,knb->b", residual[a:b], estimate.instruments[a:b]) for a, b in pairwise(edges)])
     scores = scores @ estimate.inverse.T
-    covariance = scores.T @ scores
+    own = scores.T @ scores
+    covariance = own.copy()
     for lag, weight in ((1, 2.0 / 3.0), (2, 1.0 / 3.0)):
         if len(scores) > 3 * lag:
             product = scores[lag:].T @ scores[:-lag]
             covariance = covariance + weight * (product + product.T)
+    if np.any(np.diag(covariance) < 0.25 * np.diag(own)):
+        covariance = own
     freedom = max(len(scores) - len(estimate.values) / max(residual.shape[1], 1), 1.0)
-    floor = np.diag(estimate.covariance)
-    covariance = covariance * (len(scores) / freedom)
-    low = np.diag(covariance) < floor
-    if np.any(low):
-        scale = np.where(low, np.sqrt(floor / np.maximum(np.diag(covariance), 1e-300)), 1.0)
-        if np.any(np.diag(covariance) <= 0.0):
-            return estimate.covariance
-        covariance = covariance * np.outer(scale, scale)
-    return np.asarray(covariance, dtype=np.float64)
+    return np.asarray(covariance * (len(scores) / freedom), dtype=np.float64)

@@ -77,6 +77,26 @@ def process(
     return result
 
 
+def filter_recording(recording: Recording, robot: Robot, *, cutoff: float | None = None) -> ProcessedRecording:
+    """Process a recording as one stretch, whether it repeats itself or not.
+
+    Args:
+        recording: the recording.
+        robot: the robot.
+        cutoff: of the zero-phase filter of the positions [Hz]; chosen from the data where None.
+
+    Returns:
+        The processed recording, every sample with its own torque.
+
+    Raises:
+        RecordingError: as `process`.
+    """
+    result = _not_periodic(recording, robot, _signals(recording, robot), recording.is_uniform, cutoff)
+    for text in result.warnings:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+    return result
+
+
 def _signals(recording: Recording, robot: Robot) -> _Signals:
     names = robot.joint_names
     q = recording.channel("q", names)

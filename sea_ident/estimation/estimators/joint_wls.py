@@ -23,21 +23,22 @@ class JointWLS(Estimator):
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
         rows, torque = observations.rows, observations.torque
-        samples, n, count = rows.shape
-        weights = np.ones(torque.shape)
+        n, count = rows.shape[1:]
+        valid = observations.valid.astype(float)
+        weights = valid
         for _ in range(2):
             solution = solve_weighted(rows, torque, weights)
-            residual = torque - rows @ solution.values
-            variance = (residual**2).sum(axis=0) / max(samples - count / n, 1.0)
+            residual = (torque - rows @ solution.values) * valid
+            variance = (residual**2).sum(axis=0) / np.maximum(valid.sum(axis=0) - count / n, 1.0)
             positive = variance[variance > 0.0]
             variance = np.maximum(variance, 1e-12 * positive.max() if positive.size else 1.0)
-            weights = np.broadcast_to(1.0 / variance, torque.shape)
+            weights = valid / variance
         solution = solve_weighted(rows, torque, weights)
         return Estimate(
             values=solution.values,
             instruments=rows * weights[:, :, None],
             inverse=solution.inverse,
-            weights=weights.copy(),
+            weights=weights,
             covariance=solution.inverse,
             log_det_weighted=solution.log_det,
         )

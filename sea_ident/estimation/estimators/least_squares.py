@@ -19,16 +19,17 @@ class LeastSquares(Estimator):
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
         rows, torque = observations.rows, observations.torque
-        solution = solve_weighted(rows, torque)
-        residual = torque - rows @ solution.values
-        freedom = max(residual.size - len(solution.values), 1)
+        valid = observations.valid.astype(float)
+        solution = solve_weighted(rows, torque, valid)
+        residual = (torque - rows @ solution.values) * valid
+        freedom = max(valid.sum() - len(solution.values), 1.0)
         variance = float((residual**2).sum()) / freedom
         weight = 1.0 / variance if variance > 0.0 else 1.0
         return Estimate(
             values=solution.values,
-            instruments=rows,
+            instruments=rows * valid[:, :, None],
             inverse=solution.inverse,
-            weights=np.full(torque.shape, weight),
+            weights=valid * weight,
             covariance=solution.inverse * variance,
             log_det_weighted=solution.log_det + len(solution.values) * float(np.log(weight)),
         )
