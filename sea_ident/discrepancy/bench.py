@@ -1,0 +1,485 @@
+"""The working bench: models made of effects, fitted to one recording in its noise."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+import scipy.linalg
+from numpy.typing import NDArray
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.data import PeriodData, spectrum
+from sea_ident.discrepancy.noise import NoiseFloor, noise_from_periods, stacked
+from sea_ident.effects import Anchor, Column, Contribution, Effect, Shape, State, corrected_motion
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.motion import Motion
+from sea_ident.regressor import prior_parameters
+
+ComplexArray = NDArray[np.complex128]
+
+PERIOD_SAMPLES = 2.5
+"""Samples of a single period that its model torque is computed at, per harmonic compared."""
+
+RANK_TOLERANCE = 1e-9
+"""Singular directions of the normalised columns below this share of the largest are left out."""
+
+SHAPES_THAT_STAY = {"spring_stiffening": ("exponent",), "external_force": ("start", "stop")}
+"""Shape parameters that are not refined: they say which effect it is, or come from elsewhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model fitted to the mean residual, everything free.
+
+    Attributes:
+        effects: the model, with its shapes.
+        columns: (p,) labels.
+        values: (p,) parameters; where the data tell only combinations, as near to the priors as they let.
+        residual: (H + 1, E) complex residual of the mean [N m].
+        whitened: (M,) whitened residual.
+        basis: (M, r) orthonormal basis of everything that is free: columns, and tangents of the shapes.
+        covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
+        free_shapes: (s,) which shapes are free: index of the effect, and the shape.
+    """
+
+    effects: tuple[Effect, ...]
+    columns: tuple[Column, ...]
+    values: FloatArray
+    residual: ComplexArray
+    whitened: FloatArray
+    basis: FloatArray
+    covariance_factor: FloatArray
+    free_shapes: tuple[tuple[int, Shape], ...]
+
+    @property
+    def statistic(self) -> float:
+        """Weighted sum of squared residuals."""
+        return float(self.whitened @ self.whitened)
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the statistic."""
+        return len(self.whitened) - self.basis.shape[1]
+
+    @property
+    def excess(self) -> float:
+        """Part of the statistic beyond what noise leaves, at least zero."""
+        return max(self.statistic - self.dof, 0.0)
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """Value of every parameter by name."""
+        return {column.name: float(value) for column, value in zip(self.columns, self.values, strict=True)}
+
+    def std(self, index: int) -> float:
+        """Standard deviation of a parameter (index < p) or a shape (p + position in `free_shapes`)."""
+        return float(np.linalg.norm(self.covariance_factor[index]))
+
+    def slice_of(self, position: int, robot_columns: Sequence[int]) -> slice:
+        """Columns of one effect, given the number of columns of every effect."""
+        start = int(sum(robot_columns[:position]))
+        return slice(start, start + int(robot_columns[position]))
+
+
+class Bench:
+    """Evaluates models on one recording; what was computed once is kept.
+
+    Args:
+        data: the recording.
+    """
+
+    def __init__(self, data: PeriodData) -> None:
+        self.data = data
+        self.robot = data.robot
+        self._target = spectrum(data.target(data.tau_motor) * data.weight, data.harmonics)
+        self._states: dict[tuple[Effect, ...], State] = {}
+        self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
+        stride = max(1, int(data.samples / (PERIOD_SAMPLES * data.harmonics)))
+        self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
+        self._period_targets = [
+            spectrum(data.target(tau) * data.weight, data.harmonics) for tau in data.period_tau_motor
+        ]
+        self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
+
+    # -- columns of the mean ---------------------------------------------------------------------------------------
+
+    def state(self, effects: Sequence[Effect]) -> State:
+        """Robot and mean motion, with the errors of the sensors taken out that the effects describe."""
+        signals = signal_effects(effects)
+        if signals not in self._states:
+            if len(self._states) > 12:
+                self._states.pop(next(k for k in self._states if k))
+            motion = corrected_motion(self.robot, signals, self.data.motion)
+            self._states[signals] = State(self.robot, motion, self.data.channels)
+        return self._states[signals]
+
+    def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, k) columns of one effect within a model."""
+        signals = signal_effects(effects)
+        key = (effect, signals)
+        if key not in self._columns:
+            if len(self._columns) > 400:
+                self._columns.clear()
+            self._columns[key] = self._spectra(effect.evaluate(self.state(effects)), signals)
+        return self._columns[key]
+
+    def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, v, k) columns of one effect in all its variants, not kept."""
+        state, signals = self.state(effects), signal_effects(effects)
+        parts = [variant.evaluate(state) for variant in variants]
+        both = Contribution(np.stack([p.link for p in parts], 2), np.stack([p.motor for p in parts], 2))
+        return self._spectra(both, signals)
+
+    def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
+        for signal in signals:
+            part = signal.shifted(self.robot, self.data.motion.time, part)
+        rows = self.data.rows(part)
+        touched = [e for e in range(rows.shape[1]) if np.any(rows[:, e])]
+        out = np.zeros((self.data.harmonics + 1, *rows.shape[1:]), dtype=np.complex128)
+        if touched:
+            weight = self.data.weight[:, touched].reshape(len(rows), len(touched), *([1] * (rows.ndim - 2)))
+            out[:, touched] = spectrum(rows[:, touched] * weight, self.data.harmonics)
+        return out
+
+    def design(self, effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, p) columns of a model."""
+        return np.concatenate([self.column_spectra(effect, effects) for effect in effects], axis=2)
+
+    def labels(self, effects: Sequence[Effect]) -> tuple[Column, ...]:
+        """(p,) labels of the columns of a model."""
+        return tuple(column for effect in effects for column in effect.columns(self.robot))
+
+    def counts(self, effects: Sequence[Effect]) -> list[int]:
+        """Number of columns of every effect."""
+        return [len(effect.columns(self.robot)) for effect in effects]
+
+    # -- fits --------------------------------------------------------------------------------------------------------
+
+    def fit(self, effects: Sequence[Effect], noise: NoiseFloor | None, *, tangents: bool = True) -> Fit:
+        """Fit the parameters of a model, its shapes held; without a noise floor all equations count alike."""
+        effects = tuple(effects)
+        whitener = self.whitener(noise)
+        design = self.design(effects)
+        columns = self.labels(effects)
+        prior = np.nan_to_num(prior_parameters(self.robot, effects))
+        flat = stacked(np.matmul(whitener, design))
+        left = self._target - design @ prior
+        target = stacked(np.matmul(whitener, left[:, :, None])[:, :, 0])
+        change, basis, factor = solve(flat, target)
+        values = prior + change
+        residual = self._target - design @ values
+        shapes = free_shapes(effects) if tangents else ()
+        if shapes:
+            directions = stacked(np.matmul(whitener, self.tangents(effects, columns, values, shapes)))
+            _, basis, factor = solve(np.concatenate([flat, directions], axis=1), target)
+        whitened = stacked(np.matmul(whitener, residual[:, :, None])[:, :, 0])
+        return Fit(effects, columns, values, residual, whitened, basis, factor, shapes)
+
+    def whitener(self, noise: NoiseFloor | None) -> ComplexArray:
+        """(H + 1, E, E) whitening of a noise floor."""
+        if noise is None:
+            power = np.sqrt(np.sum(np.abs(self._target) ** 2, axis=0))
+            typical = float(np.max(power))
+            scale = np.diag(1.0 / np.where(power > 0.0, power, typical)).astype(np.complex128)
+            return np.broadcast_to(scale, (self.data.harmonics + 1, *scale.shape))
+        return noise.whitener()
+
+    def tangents(
+        self,
+        effects: tuple[Effect, ...],
+        columns: tuple[Column, ...],
+        values: FloatArray,
+        shapes: Sequence[tuple[int, Shape]],
+    ) -> ComplexArray:
+        """(H + 1, E, s) change of the model torque with each free shape, in the coordinates of `coordinate`."""
+        counts = self.counts(effects)
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
+        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), len(shapes)), dtype=np.complex128)
+        parameters = {column.name: float(value) for column, value in zip(columns, values, strict=True)}
+        for k, (position, shape) in enumerate(shapes):
+            effect = effects[position]
+            if isinstance(effect, SignalEffect):
+                out[:, :, k] = self.signal_tangent(effect, shape, effects, parameters)
+                continue
+            own = values[starts[position] : starts[position + 1]]
+            low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
+            spectra = self.variant_spectra((low, high), effects)
+            out[:, :, k] = (spectra[:, :, 1] - spectra[:, :, 0]) @ own / 2e-3
+        return out
+
+    def signal_tangent(
+        self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float]
+    ) -> ComplexArray:
+        """(H + 1, E) change of the model torque with the amount of an effect in the chain of signals.
+
+        Bodies and rotors by the analytic derivatives of their torque, all other effects by differences.
+        """
+        signals = signal_effects(effects)
+        step = 1e-4 * (amount.upper - amount.lower)
+        here = float(getattr(effect, amount.name))
+        others = tuple(s for s in signals if s != effect)
+        motions, rows = [], []
+        rest = [e for e in effects if e.name not in ("rigid_bodies", "rotor_inertia") and not is_signal(e)]
+        for sign in (-1.0, 1.0):
+            changed = (*others, replace(effect, **{amount.name: here + sign * step}))  # type: ignore[arg-type]
+            motion = corrected_motion(self.robot, changed, self.data.motion)
+            motions.append(motion)
+            state = State(self.robot, motion, self.data.channels)
+            total = np.zeros((2, len(motion), self.robot.n))
+            for e in rest:
+                own = np.array([parameters.get(c.name, 0.0) for c in e.columns(self.robot)])
+                if np.any(own):
+                    part = e.evaluate(state)
+                    total += np.stack([part.link @ own, part.motor @ own])
+            rows.append(total)
+        change = (rows[1] - rows[0]) / (2.0 * step)
+        base = self.state(effects)
+        tangent = _bodies_tangent(self, base, motions[0], motions[1], parameters) / (2.0 * step)
+        part = Contribution((change[0] + tangent[0])[:, :, None], (change[1] + tangent[1])[:, :, None])
+        moved_rows = Contribution(np.zeros_like(part.link), np.zeros_like(part.motor))
+        if type(effect).shifted is not Effect.shifted:
+            moved_rows = self._shift_tangent(effect, amount, effects, parameters, step)
+        part = Contribution(part.link + moved_rows.link, part.motor + moved_rows.motor)
+        return self._spectra(part, signals)[:, :, 0]
+
+    def _shift_tangent(
+        self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float], step: float
+    ) -> Contribution:
+        """Change of the rows (N, n, 1) by an effect that moves the torque in time."""
+        state = self.state(effects)
+        link, motor = (np.zeros((len(state.motion), self.robot.n, 1)) for _ in range(2))
+        for e in effects:
+            own = np.array([parameters.get(c.name, 0.0) for c in e.columns(self.robot)])
+            if len(own) and np.any(own):
+                part = e.evaluate(state)
+                link[:, :, 0] += part.link @ own
+                motor[:, :, 0] += part.motor @ own
+        rows = Contribution(link, motor)
+        ends = [
+            replace(effect, **{amount.name: sign * step}).shifted(self.robot, self.data.motion.time, rows)  # type: ignore[arg-type]
+            for sign in (-1.0, 1.0)
+        ]
+        return Contribution(
+            (ends[1].link - ends[0].link) / (2.0 * step), (ends[1].motor - ends[0].motor) / (2.0 * step)
+        )
+
+    def refine(self, effects: Sequence[Effect], noise: NoiseFloor, *, rounds: int = 12) -> Fit:
+        """Fit parameters and shapes together: Gauss-Newton on the shapes, the parameters solved for in every step."""
+        fit = self.fit(self.anchored(effects, None), noise)
+        for _ in range(rounds):
+            better = self._refine_step(fit, noise)
+            if better is None:
+                break
+            gain = fit.statistic - better.statistic
+            fit = better
+            if gain < 0.05 + 1e-4 * fit.excess:
+                break
+        return fit
+
+    def _refine_step(self, fit: Fit, noise: NoiseFloor) -> Fit | None:
+        if not fit.free_shapes:
+            return None
+        whitener = self.whitener(noise)
+        directions = stacked(
+            np.matmul(whitener, self.tangents(fit.effects, fit.columns, fit.values, fit.free_shapes))
+        )
+        flat = stacked(np.matmul(whitener, self.design(fit.effects)))
+        scale = np.linalg.norm(directions, axis=0)
+        usable = scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)
+        if not np.any(usable):
+            return None
+        _, plane, _ = solve(flat, fit.whitened)
+        across = directions - plane @ (plane.T @ directions)
+        across_scale = np.linalg.norm(across, axis=0)
+        damping = 1e-3 * np.max(across_scale)
+        normal = across.T @ across + damping**2 * np.eye(len(scale))
+        step = np.linalg.solve(normal, across.T @ fit.whitened)
+        largest = max(float(np.max(np.abs(step))), 1e-300)
+        step *= min(1.0, 1.0 / largest)
+        for _ in range(5):
+            effects = list(fit.effects)
+            for (position, shape), amount in zip(fit.free_shapes, step, strict=True):
+                effects[position] = moved(effects[position], shape, float(amount))
+            new = self.fit(effects, noise)
+            if new.statistic < fit.statistic:
+                return new
+            step = step / 3.0
+        return None
+
+    def anchored(self, effects: Sequence[Effect], parameters: dict[str, float] | None) -> tuple[Effect, ...]:
+        """The same effects, knowing what they need of the rest of the model."""
+        effects = tuple(effects)
+        if parameters is None:
+            return effects
+        anchor = Anchor(self.robot, effects, parameters)
+        return tuple(effect.anchored(anchor) for effect in effects)
+
+    # -- noise -------------------------------------------------------------------------------------------------------
+
+    def period_residuals(self, fit: Fit) -> ComplexArray:
+        """(P, H + 1, E) residuals of every period from its own signals."""
+        data = self.data
+        signals = signal_effects(fit.effects)
+        bodies = [e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia")]
+        rest = [e for e in fit.effects if e.name not in ("rigid_bodies", "rotor_inertia")]
+        own = np.concatenate(
+            [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
+        )
+        out = np.empty((data.periods, data.harmonics + 1, len(data.equations)), dtype=np.complex128)
+        for p, (state, body_rows) in enumerate(self._body_rows(signals, tuple(bodies))):
+            rows = body_rows @ own
+            link = rows[:, : self.robot.n].copy()
+            motor = rows[:, self.robot.n :].copy()
+            for e in rest:
+                values = np.array([fit.parameters[c.name] for c in e.columns(self.robot)])
+                if len(values):
+                    part = e.evaluate(state)
+                    link += part.link @ values
+                    motor += part.motor @ values
+            part = Contribution(link, motor)
+            for signal in signals:
+                part = signal.shifted(self.robot, state.motion.time, part)
+            rows = data.rows(part) * data.weight[:: self._stride]
+            out[p] = self._period_targets[p] - spectrum(rows, data.harmonics)
+        return out
+
+    def _body_rows(
+        self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]
+    ) -> list[tuple[State, FloatArray]]:
+        """State and rows (N', 2 n, k) of bodies and rotors for every period, at fewer samples."""
+        if signals not in self._period_bodies:
+            if len(self._period_bodies) > 3:
+                self._period_bodies.clear()
+            found = []
+            for motion in self.data.period_motions:
+                thin = corrected_motion(self.robot, signals, motion)[:: self._stride]
+                state = State(self.robot, thin, _thinned(self.data.channels, self._stride))
+                parts = [body.evaluate(state) for body in bodies]
+                width = 2 * self.robot.n
+                rows = np.concatenate(
+                    [np.concatenate([part.link, part.motor], axis=1) for part in parts]
+                    or [np.zeros((len(thin), width, 0))],
+                    axis=2,
+                )
+                found.append((State(self.robot, thin, state.channels), rows))
+            self._period_bodies[signals] = found
+        return self._period_bodies[signals]
+
+    def noise(self, fit: Fit) -> NoiseFloor:
+        """Noise floor with the parameters of a fit."""
+        return noise_from_periods(self.period_residuals(fit))
+
+
+def _thinned(channels: "dict[str, FloatArray] | object", stride: int) -> dict[str, FloatArray]:
+    return {kind: values[::stride] for kind, values in dict(channels).items()}  # type: ignore[call-overload]
+
+
+def solve(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Least squares with columns that may depend on each other.
+
+    Args:
+        columns: (M, p).
+        target: (M,).
+
+    Returns:
+        (p,) smallest solution in normalised columns, (M, r) orthonormal basis, and (p, r) factor L so that L L' is the
+        covariance of the solution for targets of unit variance.
+    """
+    if columns.shape[1] == 0:
+        return np.zeros(0), np.zeros((len(columns), 0)), np.zeros((0, 0))
+    norms = np.linalg.norm(columns, axis=0)
+    scale = np.where(norms > 1e-300, norms, 1.0)
+    # QR first: the singular values of a small triangle cost next to nothing
+    q, r = scipy.linalg.qr(columns / scale, mode="economic", check_finite=False)
+    left, strength, right = np.linalg.svd(r)
+    keep = strength > RANK_TOLERANCE * max(float(strength[0]), 1e-300)
+    basis = q @ left[:, : len(strength)][:, keep]
+    factor = (right[: len(strength)][keep].T / strength[keep]) / scale[:, None]
+    return factor @ (basis.T @ target), basis, factor
+
+
+def is_signal(effect: Effect) -> bool:
+    """Whether an effect sits in the chain of signals."""
+    return isinstance(effect, SignalEffect)
+
+
+def signal_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Those effects that sit in the chain of signals."""
+    return tuple(effect for effect in effects if is_signal(effect))
+
+
+def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
+    """Shape parameters that a fit is free to change, and amounts of signal effects."""
+    found: list[tuple[int, Shape]] = []
+    for position, effect in enumerate(effects):
+        stay = SHAPES_THAT_STAY.get(effect.name, ())
+        shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
+        found.extend((position, shape) for shape in shapes if shape.name not in stay)
+    return tuple(found)
+
+
+def moved(effect: Effect, shape: Shape, step: float) -> Effect:
+    """The effect with one shape moved: by a factor exp(step), or by `step` of its range, within its range."""
+    value = float(getattr(effect, shape.name))
+    new = value * np.exp(step) if shape.logarithmic else value + step * (shape.upper - shape.lower)
+    return replace(effect, **{shape.name: float(np.clip(new, shape.lower, shape.upper))})  # type: ignore[arg-type]
+
+
+def _bodies_tangent(
+    bench: Bench, state: State, low: Motion, high: Motion, parameters: dict[str, float]
+) -> FloatArray:
+    """(2, N, n) change of link and motor rows of bodies and rotors from one motion to another close by."""
+    robot, motion = bench.robot, state.motion
+    dx = robot.extended_state(high.q, high.theta) - robot.extended_state(low.q, low.theta)
+    dv = robot.extended_rate(high.dq, high.dtheta) - robot.extended_rate(low.dq, low.dtheta)
+    da = robot.extended_rate(high.ddq, high.ddtheta) - robot.extended_rate(low.ddq, low.ddtheta)
+    touched = np.any(dx) or np.any(dv) or np.any(da)
+    if not touched:
+        return np.zeros((2, len(motion), robot.n))
+    by_position, by_velocity, mass = bench_derivatives(bench, state, parameters)
+    torque = np.einsum("kij,kj->ki", by_position, dx) + np.einsum("kij,kj->ki", by_velocity, dv)
+    torque += np.einsum("kij,kj->ki", mass, da)
+    return np.stack([torque @ robot.link_map, torque @ robot.motor_map])
+
+
+def bench_derivatives(
+    bench: Bench, state: State, parameters: dict[str, float]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Derivatives (N, nv, nv) of the torque of bodies and rotors with position, velocity, acceleration.
+
+    The torque is linear in the inertial parameters. A unit mass is put on every body and its own derivative taken off
+    again, so that a body without mass may have a first moment.
+    """
+    robot = bench.robot
+    inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
+    rotors = np.array([parameters.get(f"{rotor.rotor_group}.rotor_inertia", 0.0) for rotor in robot.rotors])
+    key = (tuple(inertial), tuple(rotors), id(state))
+    cached = getattr(bench, "_derivatives", None)
+    if cached is not None and cached[0] == key:
+        return cached[1]  # type: ignore[no-any-return]
+    unit = np.zeros_like(inertial)
+    unit[::10] = 1.0
+    offset = 1.0 + 10.0 * float(np.max(np.abs(inertial), initial=0.0))
+    whole = robot.with_inertial_parameters(inertial + offset * unit, rotors)
+    alone = robot.with_inertial_parameters(offset * unit, np.zeros_like(rotors))
+    motion = state.motion
+    x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
+    v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
+    a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))
+    out = []
+    for part in (whole, alone):
+        model = part.extended_model
+        data = model.createData()
+        size = model.nv
+        parts = np.empty((3, len(motion), size, size))
+        for k in range(len(motion)):
+            pin.computeRNEADerivatives(model, data, x[k], v[k], a[k])
+            parts[0, k], parts[1, k] = data.dtau_dq, data.dtau_dv
+            mass = data.M
+            parts[2, k] = np.triu(mass) + np.triu(mass, 1).T
+        out.append(parts)
+    result = tuple(out[0] - out[1])
+    bench._derivatives = (key, result)  # type: ignore[attr-defined]
+    return result  # type: ignore[return-value]

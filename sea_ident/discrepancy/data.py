@@ -1,0 +1,229 @@
+"""A recording as periods of equations: what every comparison of model and data starts from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects import Contribution
+from sea_ident.exceptions import DiagnosisError
+from sea_ident.motion import Motion
+from sea_ident.processing import ProcessedRecording, process
+from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
+
+HIGHEST_FREQUENCY = 20.0
+"""Model and data are compared up to this frequency [Hz], where the samples allow it."""
+
+MOST_HARMONICS = 200
+"""Largest number of harmonics that are compared."""
+
+REGRESSOR_MARGIN = 1.25
+"""The regressor keeps this many times the harmonics that are compared."""
+
+
+REVERSAL_SAMPLES = 2
+"""Samples to either side of a reversal of a motor that are left out of its equation."""
+
+SLOWEST = 0.02
+"""Samples slower than this share of the rms speed are left out of the equation of a motor."""
+
+
+class EquationKind(StrEnum):
+    """Which equation of a joint."""
+
+    MOTOR = "motor"
+    LINK = "link"
+    SUM = "sum"
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One equation of motion: of the motor, of the link, or at a rigid joint of both together.
+
+    Attributes:
+        joint: name of the joint.
+        index: its index.
+        kind: which equation.
+    """
+
+    joint: str
+    index: int
+    kind: EquationKind
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodData:
+    """Motions and torques of P periods.
+
+    Attributes:
+        robot: the robot.
+        source: where the recording came from.
+        period: [s].
+        motion: (N, n) mean motion.
+        tau_motor: (N, n) mean motor torque [N m].
+        period_motions: (P,) motion of every period.
+        period_tau_motor: (P, N, n) motor torque of every period [N m].
+        channels: further mean signals (N, n) by kind.
+        equations: (E,) equations.
+        harmonics: H, harmonics that are compared.
+        weight: (N, E) 0 at the samples of an equation that are left out, 1 elsewhere.
+        warnings: what a user should know.
+    """
+
+    robot: Robot
+    source: str
+    period: float
+    motion: Motion
+    tau_motor: FloatArray
+    period_motions: tuple[Motion, ...]
+    period_tau_motor: FloatArray
+    channels: Mapping[str, FloatArray]
+    equations: tuple[Equation, ...]
+    harmonics: int
+    weight: FloatArray
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def periods(self) -> int:
+        """Number P of periods."""
+        return len(self.period_tau_motor)
+
+    @property
+    def samples(self) -> int:
+        """Number N of samples of a period."""
+        return len(self.motion)
+
+    def rows(self, part: Contribution) -> FloatArray:
+        """(N, E, ...) rows of the equations from link and motor rows (N, n, ...)."""
+        return equation_rows(self.equations, part)
+
+    def target(self, tau_motor: FloatArray) -> FloatArray:
+        """(N, E) what the rows must sum up to: the motor torque, and zero in a link equation."""
+        out = np.zeros((len(tau_motor), len(self.equations)))
+        for e, equation in enumerate(self.equations):
+            if equation.kind is not EquationKind.LINK:
+                out[:, e] = tau_motor[:, equation.index]
+        return out
+
+
+def equation_rows(equations: tuple[Equation, ...], part: Contribution) -> FloatArray:
+    """(N, E, ...) rows of the equations from link and motor rows (N, n, ...)."""
+    rows = [
+        part.motor[:, eq.index]
+        if eq.kind is EquationKind.MOTOR
+        else part.link[:, eq.index]
+        if eq.kind is EquationKind.LINK
+        else part.link[:, eq.index] + part.motor[:, eq.index]
+        for eq in equations
+    ]
+    return np.stack(rows, axis=1)
+
+
+def equations_of(robot: Robot) -> tuple[Equation, ...]:
+    """The equations that a recording of this robot gives."""
+    found = []
+    for i, joint in enumerate(robot.joints):
+        kinds = (EquationKind.MOTOR, EquationKind.LINK) if joint.elastic else (EquationKind.SUM,)
+        found.extend(Equation(joint.name, i, kind) for kind in kinds)
+    return tuple(found)
+
+
+def harmonics_for(period: float, samples: int) -> int:
+    """Number of harmonics that a period of this length and this many samples is compared by."""
+    by_frequency = int(HIGHEST_FREQUENCY * period)
+    by_samples = int((samples - 1) / 2 / REGRESSOR_MARGIN * 0.8)
+    return max(min(by_frequency, by_samples, MOST_HARMONICS), 1)
+
+
+def wide_processing(
+    recording: Recording | ProcessedRecording, robot: Robot, period: float | None
+) -> ProcessedRecording:
+    """The recording with a regressor that reaches beyond the harmonics that are compared.
+
+    Raises:
+        RecordingError: if it lacks what is needed.
+    """
+    if isinstance(recording, ProcessedRecording):
+        return recording
+    first = process(recording, robot, period=period)
+    if first.period is None:
+        return first
+    wide = int(REGRESSOR_MARGIN * harmonics_for(first.period, first.samples))
+    return process(recording, robot, period=first.period, link_harmonics=wide, motor_harmonics=wide)
+
+
+def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
+    """The periods of a processed recording.
+
+    Raises:
+        DiagnosisError: if it belongs to other joints, or is not periodic.
+    """
+    if processed.joint_names != robot.joint_names:
+        raise DiagnosisError(
+            f"{processed.source} was processed for the joints {', '.join(processed.joint_names)}; "
+            f"{robot.name} has {', '.join(robot.joint_names)}"
+        )
+    if processed.period is None:
+        raise DiagnosisError(f"{processed.source} is not periodic")
+    reach = min(processed.link_harmonics, processed.motor_harmonics)
+    harmonics = min(harmonics_for(processed.period, processed.samples), max(int(reach / REGRESSOR_MARGIN), 1))
+    return PeriodData(
+        robot=robot,
+        source=processed.source,
+        period=processed.period,
+        motion=processed.motion,
+        tau_motor=processed.tau_motor,
+        period_motions=processed.period_motions or (processed.motion,),
+        period_tau_motor=processed.period_tau_motor,
+        channels=processed.channels,
+        equations=equations_of(robot),
+        harmonics=harmonics,
+        weight=reversal_weight(processed.motion, equations_of(robot)),
+        warnings=processed.warnings,
+    )
+
+
+def reversal_weight(motion: Motion, equations: tuple[Equation, ...]) -> FloatArray:
+    """(N, E) 0 where a motor is about to reverse, in the equations that hold its torque.
+
+    There a sample falls on one or the other side of a jump (of friction, of the efficiency of the gear) by a velocity
+    that is known no better than to its sign: no model of the mean can be right.
+    """
+    weight = np.ones((len(motion), len(equations)))
+    for e, equation in enumerate(equations):
+        if equation.kind is EquationKind.LINK:
+            continue
+        speed = motion.dtheta[:, equation.index]
+        left_out = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
+        crossing = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, 1)))
+        for shift in range(-REVERSAL_SAMPLES, REVERSAL_SAMPLES):
+            left_out[(crossing + shift) % len(speed)] = True
+        weight[left_out, e] = 0.0
+    return weight
+
+
+def spectrum(values: FloatArray, harmonics: int) -> np.typing.NDArray[np.complex128]:
+    """Fourier coefficients of one period of real signals.
+
+    Args:
+        values: (N, ...) samples.
+        harmonics: H.
+
+    Returns:
+        (H + 1, ...) coefficients, scaled so that the squares of their moduli sum up to the mean square of the part of
+        the signal within the band.
+    """
+    coefficients = np.fft.rfft(values, axis=0)[: harmonics + 1] / len(values)
+    coefficients[1:] *= np.sqrt(2.0)
+    return np.asarray(coefficients, dtype=np.complex128)
+
+
+def waveform(coefficients: np.typing.NDArray[np.complex128], samples: int) -> FloatArray:
+    """(N, ...) samples from the coefficients of `spectrum`: the inverse of it within the band."""
+    full = np.zeros((samples // 2 + 1, *coefficients.shape[1:]), dtype=np.complex128)
+    full[: len(coefficients)] = coefficients * samples
+    full[1 : len(coefficients)] /= np.sqrt(2.0)
+    return np.asarray(np.fft.irfft(full, samples, axis=0), dtype=np.float64)

@@ -1,0 +1,109 @@
+"""The noise floor, from the periods of the recording itself."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sea_ident._typing import FloatArray
+
+ComplexArray = NDArray[np.complex128]
+
+SMALLEST_HALF_WIDTH = 4
+"""Noise is smoothed over at least this many harmonics to either side."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFloor:
+    """Covariance of the mean residual over the equations, per harmonic, and the whitening that follows from it.
+
+    Attributes:
+        covariance: (H + 1, E, E) of each real component of the mean residual [(N m)^2].
+        remainder: (H + 1, E) variance that stands for what no model has [(N m)^2]; zero by default.
+        periods: P.
+        freedom: complex degrees of freedom of every covariance.
+        total_freedom: real degrees of freedom of the whole estimate.
+    """
+
+    covariance: ComplexArray
+    remainder: FloatArray
+    periods: int
+    freedom: float
+    total_freedom: float
+
+    @property
+    def equations(self) -> int:
+        """Number E of equations."""
+        return int(self.covariance.shape[1])
+
+    @property
+    def std(self) -> FloatArray:
+        """(E,) rms of the noise of the mean residual within the band [N m]."""
+        power = np.real(np.einsum("kee->ke", self.covariance))
+        weight = np.full(len(power), 2.0)
+        weight[0] = 1.0
+        return np.asarray(np.sqrt(weight @ power), dtype=np.float64)
+
+    def with_remainder(self, remainder: FloatArray) -> "NoiseFloor":
+        """The same noise with a variance (H + 1, E) on top."""
+        return replace(self, remainder=remainder)
+
+    def whitener(self) -> ComplexArray:
+        """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
+        count = self.equations
+        total = self.covariance + np.einsum("ke,ef->kef", self.remainder, np.eye(count))
+        triangle = np.linalg.cholesky(total)
+        unbiased = np.sqrt(max(self.freedom - count, 1.0) / self.freedom)
+        inverse = np.linalg.solve(triangle, np.broadcast_to(np.eye(count, dtype=np.complex128), triangle.shape))
+        return np.asarray(unbiased * inverse, dtype=np.complex128)
+
+
+def stacked(values: ComplexArray) -> FloatArray:
+    """(E (2 H + 1), ...) real numbers from complex coefficients (H + 1, E, ...): constants, real, imaginary parts."""
+    rest = values[1:].reshape(-1, *values.shape[2:])
+    return np.concatenate([values[0].real, rest.real, rest.imag])
+
+
+def noise_from_periods(residuals: ComplexArray) -> NoiseFloor:
+    """Covariance of the mean residual from successive differences of the periods.
+
+    Differences, and not distances from the mean, so that a drift over the recording does not count as noise.
+
+    Args:
+        residuals: (P, H + 1, E) residuals of every period from its own signals.
+
+    Returns:
+        The noise floor.
+    """
+    periods, harmonics, count = residuals.shape
+    steps = np.diff(residuals, axis=0) / np.sqrt(2.0)
+    products = np.einsum("pke,pkf->kef", steps, steps.conj()) / max(periods - 1, 1)
+    products[1:] /= 2.0
+    products[0] = products[0].real
+    # variance of a mean of squared successive differences, as degrees of freedom
+    each = 2.0 * (periods - 1) ** 2 / (3.0 * periods - 4.0) if periods > 2 else 1.0
+    half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * count / each - 1.0) / 2.0)))
+    half = min(half, max((harmonics - 1) // 2, 1))
+    smooth = _moving_mean(products, half)
+    # a constant that wanders more than its neighbours has a floor of its own
+    ratio = np.real(np.einsum("ee->e", products[0])) / np.real(np.einsum("ee->e", smooth[0]))
+    inflate = np.sqrt(np.where(ratio > 4.0, ratio, 1.0))
+    smooth[0] = smooth[0].real * np.outer(inflate, inflate)
+    scale = np.real(np.einsum("kee->ke", smooth))
+    smooth += np.einsum("ke,ef->kef", 1e-12 * scale + 1e-300, np.eye(count))
+    return NoiseFloor(
+        covariance=smooth / periods,
+        remainder=np.zeros((harmonics, count)),
+        periods=periods,
+        freedom=each * (2 * half + 1),
+        total_freedom=each * 2.0 * harmonics,
+    )
+
+
+def _moving_mean(values: ComplexArray, half: int) -> ComplexArray:
+    """Mean over 2 half + 1 neighbours; at the ends over as many as there are on the inside."""
+    length = len(values)
+    total = np.concatenate([np.zeros((1, *values.shape[1:]), dtype=np.complex128), np.cumsum(values, axis=0)])
+    width = min(2 * half + 1, length)
+    start = np.clip(np.arange(length) - half, 0, length - width)
+    return np.asarray((total[start + width] - total[start]) / width, dtype=np.complex128)
