@@ -10,9 +10,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import PeriodData, spectrum
+from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
 from sea_ident.discrepancy.noise import NoiseFloor, noise_from_periods, stacked
-from sea_ident.effects import Anchor, Column, Contribution, Effect, Shape, State, corrected_motion
+from sea_ident.effects import Anchor, Column, Contribution, Effect, Shape, Side, State, corrected_motion
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.regressor import prior_parameters
@@ -370,6 +370,31 @@ class Bench:
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor with the parameters of a fit."""
         return noise_from_periods(self.period_residuals(fit))
+
+    def with_remainder(self, noise: NoiseFloor, fit: Fit, share: float) -> NoiseFloor:
+        """The noise floor raised by a share of the torque, frequency by frequency, for what no model has."""
+        if share == 0.0:
+            return noise
+        power = np.abs(self.torque_spectrum(fit)) ** 2
+        power[1:] /= 2.0
+        width = 9
+        padded = np.concatenate([power[width // 2 : 0 : -1], power, power[-2 : -2 - width // 2 : -1]])
+        total = np.cumsum(np.concatenate([np.zeros((1, power.shape[1])), padded]), axis=0)
+        return noise.with_remainder(share**2 * (total[width:] - total[:-width]) / width)
+
+    def torque_spectrum(self, fit: Fit) -> ComplexArray:
+        """(H + 1, E) torque that each equation is about: of the motor, of the spring in a link equation."""
+        out = self._target.copy()
+        springs = [e for e in fit.effects if e.side is Side.SPRING]
+        counts, spring = self.counts(springs), np.zeros_like(out)
+        for effect, count in zip(springs, counts, strict=True):
+            own = np.array([fit.parameters[c.name] for c in effect.columns(self.robot)])
+            if count:
+                spring += self.column_spectra(effect, fit.effects) @ own
+        for e, equation in enumerate(self.data.equations):
+            if equation.kind is EquationKind.LINK:
+                out[:, e] = spring[:, e]
+        return out
 
 
 def _thinned(channels: "dict[str, FloatArray] | object", stride: int) -> dict[str, FloatArray]:
