@@ -2,6 +2,7 @@
 
 from sea_ident.simulation.controller import ComputedTorque, Controller, VelocityController
 from sea_ident.simulation.friction import FrictionJitter, FrictionLaw, PreslidingCoulomb, SmoothCoulomb
+from sea_ident.simulation.model_plant import ModelPlant, plant_from_model
 from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
 from sea_ident.simulation.result import Simulation
 from sea_ident.simulation.sensors import SensorNoise, WarmUp, motor_current
@@ -12,6 +13,7 @@ __all__ = [
     "Controller",
     "FrictionJitter",
     "FrictionLaw",
+    "ModelPlant",
     "Plant",
     "PlantedEffect",
     "PreslidingCoulomb",
@@ -22,6 +24,7 @@ __all__ = [
     "VelocityController",
     "WarmUp",
     "motor_current",
+    "plant_from_model",
     "plant_from_robot",
     "simulate",
 ]

@@ -106,17 +106,18 @@ class ClosedLoop:
 
     # -- forces ------------------------------------------------------------------------------------------------------
 
-    def forces(self, time: float, elapsed: float, bias: list[float], u: list[float], w: list[float]) -> list[float]:
+    def _forces(self, time: float, elapsed: float, bias: list[float], u: FloatArray, w: FloatArray) -> list[float]:
         """Generalised forces of drive, springs, friction and planted effects [N m]; keeps the torques of the drive."""
+        position, velocity = u.tolist(), w.tolist()
         out = [0.0] * self.size
         tau_motor, tau_spring = self.tau_motor, self.tau_spring
         for i, m, kp, kd, k1, k3, d, motor_friction, link_friction in self._joints:
-            theta, dtheta = u[m], w[m]
+            theta, dtheta = position[m], velocity[m]
             torque = bias[i] - kp * theta - kd * dtheta
             tau_motor[i] = torque
             torque -= motor_friction(theta, dtheta)
             if m != i:
-                q, dq = u[i], w[i]
+                q, dq = position[i], velocity[i]
                 deflection = theta - q
                 spring = deflection * (k1 + k3 * deflection * deflection) + d * (dtheta - dq)
                 tau_spring[i] = spring
@@ -158,7 +159,7 @@ class ClosedLoop:
             if link_friction is not None:
                 link_friction.accept(values[i], values[size + i])
         if self.planted is not None:
-            self.planted.accept(time, values[:size], values[size:], self.tau_motor, self.tau_spring)
+            self.planted.accept(time, y[:size], y[size:], self.tau_motor, self.tau_spring)
 
     # -- one step ----------------------------------------------------------------------------------------------------
 
@@ -172,10 +173,9 @@ class ClosedLoop:
         """
         size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
         u, w = y[:size], y[size:]
-        u_list, w_list = u.tolist(), w.tolist()
         self._find_load(time, 0.0, biases[0], u, w, LOAD_ROUNDS)
-        mass, force = self._mass_and_force(time, 0.0, biases[0], u, w, u_list, w_list)
-        stiffness, damping = self._jacobian(time, u_list, w_list)
+        mass, force = self._mass_and_force(time, 0.0, biases[0], u, w)
+        stiffness, damping = self._jacobian(time, u, w)
         stiffness *= hgamma
         factor, info = dpotrf(mass / hgamma + damping + stiffness)
         if info != 0:
@@ -215,12 +215,12 @@ class ClosedLoop:
     def _acceleration(self, time: float, elapsed: float, bias: list[float], u: FloatArray, w: FloatArray) -> FloatArray:
         """(size,) accelerations at a trial state."""
         if self._inverse is None:
-            mass, force = self._mass_and_force(time, elapsed, bias, u, w, u.tolist(), w.tolist())
+            mass, force = self._mass_and_force(time, elapsed, bias, u, w)
             _, acceleration, info = dposv(mass, force)
             if info != 0:
                 raise SimulationError(self._not_positive(u))
         else:  # every coordinate is a joint of Pinocchio's model: its forward dynamics are the shorter way
-            force = self._inverse_t.dot(np.array(self.forces(time, elapsed, bias, u.tolist(), w.tolist())))
+            force = self._inverse_t.dot(np.array(self._forces(time, elapsed, bias, u, w)))
             x = self._map.dot(u) + self._offset
             acceleration = self._inverse.dot(pin.aba(self._model, self._data, x, self._map.dot(w), force))
         result: FloatArray = acceleration
@@ -233,30 +233,29 @@ class ClosedLoop:
         bias: list[float],
         u: FloatArray,
         w: FloatArray,
-        u_list: list[float],
-        w_list: list[float],
     ) -> tuple[FloatArray, FloatArray]:
         """Mass matrix (size, size), and forces (size,) with gravity, Coriolis and centrifugal forces in them."""
         x = self._map.dot(u) + self._offset
-        force = np.array(self.forces(time, elapsed, bias, u_list, w_list))
+        force = np.array(self._forces(time, elapsed, bias, u, w))
         force -= self._map_t.dot(pin.nonLinearEffects(self._model, self._data, x, self._map.dot(w)))
         mass: FloatArray = self._map_t.dot(pin.crba(self._model, self._data, x)).dot(self._map)
         return mass, force
 
-    def _jacobian(self, time: float, u: list[float], w: list[float]) -> tuple[FloatArray, FloatArray]:
+    def _jacobian(self, time: float, u: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Symmetric stiffness and damping of the forces: an approximation is enough for the method's order."""
         stiffness, damping = self._constant_stiffness.copy(), self._constant_damping.copy()
+        position, velocity = u.tolist(), w.tolist()
         for i, m, k1, k3, motor_slope, link_slope in self._slopes:
-            damping[m, m] += motor_slope(w[m])
+            damping[m, m] += motor_slope(velocity[m])
             if m != i:
-                deflection = u[m] - u[i]
+                deflection = position[m] - position[i]
                 k = k1 + 3.0 * k3 * deflection * deflection
                 stiffness[i, i] += k
                 stiffness[m, m] += k
                 stiffness[i, m] -= k
                 stiffness[m, i] -= k
                 if link_slope is not None:
-                    damping[i, i] += link_slope(w[i])
+                    damping[i, i] += link_slope(velocity[i])
         if self.planted is not None:
             self.planted.add_damping(time, u, w, self.tau_motor, self.tau_spring, damping)
         return stiffness, damping

@@ -55,7 +55,7 @@ class Plant:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in self._numbers():
+        for name in self.numbers():
             values = np.asarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, values)
             if values.shape != (self.robot.n,):
@@ -75,7 +75,8 @@ class Plant:
                 raise SimulationError(f"joint {joint.name!r}: efficiency {self.efficiency[i]:g} is not in (0, 1]")
 
     @staticmethod
-    def _numbers() -> tuple[str, ...]:
+    def numbers() -> tuple[str, ...]:
+        """Names of the (n,) fields."""
         return (
             "viscous_friction", "coulomb_friction", "link_viscous_friction", "link_coulomb_friction", "stiffness",
             "cubic_stiffness", "spring_damping", "efficiency", "torque_constant",
@@ -148,8 +149,11 @@ def plant_from_robot(robot: Robot) -> Plant:
     Raises:
         SimulationError: a number is missing; the message names the joint and the element.
     """
-    n, missing, notes = robot.n, [], []
-    numbers = {name: np.zeros(n) for name in Plant._numbers()}
+    n = robot.n
+    missing: list[str] = []
+    linear: list[str] = []
+    lossless: list[str] = []
+    numbers = {name: np.zeros(n) for name in Plant.numbers()}
     numbers["efficiency"][:] = 1.0
     numbers["torque_constant"][:] = np.nan
     for i, joint in enumerate(robot.joints):
@@ -171,12 +175,12 @@ def plant_from_robot(robot: Robot) -> Plant:
             numbers["spring_damping"][i] = spring.damping or 0.0
             numbers["cubic_stiffness"][i] = spring.cubic_stiffness or 0.0
             if spring.cubic_stiffness is None:
-                notes.append(f"joint {joint.name!r}: no cubicStiffness, its spring is linear")
+                linear.append(joint.name)
         missing += [f"{joint.name}: {tag}" for tag, value in wanted.items() if value is None]
         numbers["viscous_friction"][i] += actuator.viscous_friction or 0.0
         numbers["coulomb_friction"][i] += actuator.coulomb_friction or 0.0
         if actuator.efficiency is None:
-            notes.append(f"joint {joint.name!r}: no efficiency, its transmission loses nothing")
+            lossless.append(joint.name)
         else:
             numbers["efficiency"][i] = actuator.efficiency
         if actuator.torque_constant is not None:
@@ -184,6 +188,11 @@ def plant_from_robot(robot: Robot) -> Plant:
     if missing:
         raise SimulationError(
             f"{robot.source}: a simulation needs numbers that the annotation leaves out: {'; '.join(missing)}. "
-            "Add them to the <transmission>, or give simulate(plant=...) "
+            "Add them to the <transmission>, or give simulate(plant=...)"
         )
+    notes = []
+    if linear:
+        notes.append(f"no cubicStiffness, so a linear spring: {', '.join(linear)}")
+    if lossless:
+        notes.append(f"no efficiency, so a transmission without losses: {', '.join(lossless)}")
     return Plant(robot, notes=tuple(notes), **numbers)

@@ -35,12 +35,14 @@ class PlantedTorques:
 
     Attributes:
         needs_load: whether an effect asks for the load of a rigid joint.
+        idle: whether nothing acts as a torque.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PlantedEffect], begin: float) -> None:
-        self._n, self._begin = robot.n, begin
+        n = robot.n
+        self._begin = begin
         self._motor = np.array(motor_coordinates(robot), dtype=np.intp)
-        acting = [p for p in effects if overrides(p.effect, "torque")]
+        acting = [p for p in effects if p.effect.side is not Side.SENSOR and overrides(p.effect, "torque")]
         hooks = [(p.effect.side is Side.SPRING, p.effect.torque(robot, p.values)) for p in acting]
         # Springs first: the others may depend on the torque that they transmit.
         self._springs = [hook for spring, hook in hooks if spring]
@@ -48,91 +50,96 @@ class PlantedTorques:
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
         self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
+        self.idle = not hooks
+        # One state for all calls: to build one would take longer than most effects.
+        zeros = [np.zeros(n) for _ in range(6)]
+        self._state = SimulationState(0.0, zeros[0], zeros[1], zeros[2], zeros[3], zeros[4], zeros[5])
+        self._link, self._torque = np.zeros(n), np.zeros(n)
+        self._out = np.zeros(n + len(robot.elastic_indices))
 
-    def _state(
+    def _set(
         self,
         time: float,
         elapsed: float,
-        u: list[float],
-        w: list[float],
+        u: FloatArray,
+        w: FloatArray,
         tau_motor: list[float],
         tau_spring: list[float],
-    ) -> SimulationState:
-        n, motor = self._n, self._motor
-        position, velocity = np.array(u), np.array(w)
-        return SimulationState(
-            time=max(time, self._begin),
-            q=position[:n],
-            dq=velocity[:n],
-            theta=position[motor],
-            dtheta=velocity[motor],
-            tau_spring=np.array(tau_spring),
-            tau_motor=np.array(tau_motor),
-            elapsed=elapsed,
-        )
+    ) -> None:
+        state, n = self._state, len(self._link)
+        object.__setattr__(state, "time", max(time, self._begin))
+        object.__setattr__(state, "elapsed", elapsed)
+        state.q[:] = u[:n]
+        state.dq[:] = w[:n]
+        u.take(self._motor, out=state.theta)
+        w.take(self._motor, out=state.dtheta)
+        state.tau_motor[:] = tau_motor
+        state.tau_spring[:] = tau_spring
+
+    def _act(self) -> FloatArray:
+        """(size,) torques at the state that is set; springs change its spring torques."""
+        state, link, motor, out = self._state, self._link, self._torque, self._out
+        link[:] = 0.0
+        motor[:] = 0.0
+        for act in self._springs:
+            act(state, link, motor)
+        if self._springs:
+            state.tau_spring[:] -= link
+        for act in self._others:
+            act(state, link, motor)
+        out[:] = 0.0
+        out[: len(link)] = link
+        out[self._motor] += motor
+        return out
 
     def add(
         self,
         time: float,
         elapsed: float,
-        u: list[float],
-        w: list[float],
+        u: FloatArray,
+        w: FloatArray,
         tau_motor: list[float],
         tau_spring: list[float],
         out: list[float],
     ) -> None:
         """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
-        link, motor = np.zeros(self._n), np.zeros(self._n)
-        state = self._state(time, elapsed, u, w, tau_motor, tau_spring)
-        for act in self._springs:
-            act(state, link, motor)
+        self._set(time, elapsed, u, w, tau_motor, tau_spring)
+        for i, torque in enumerate(self._act().tolist()):
+            out[i] -= torque
         if self._springs:
-            state.tau_spring[:] -= link
-            tau_spring[:] = state.tau_spring.tolist()
-        for act in self._others:
-            act(state, link, motor)
-        for i, torque in enumerate(link.tolist()):
-            out[i] -= torque
-        for i, torque in zip(self._motor.tolist(), motor.tolist(), strict=True):
-            out[i] -= torque
+            tau_spring[:] = self._state.tau_spring.tolist()
 
     def add_damping(
         self,
         time: float,
-        u: list[float],
-        w: list[float],
+        u: FloatArray,
+        w: FloatArray,
         tau_motor: list[float],
         tau_spring: list[float],
         damping: FloatArray,
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
-        n, motor = self._n, self._motor.tolist()
-        base = self._forces(time, u, w, tau_motor, tau_spring)
-        for side in (range(n), [m for i, m in enumerate(motor) if m != i]):
-            moved = list(w)
-            for k in side:
-                moved[k] += SMALL_SPEED if moved[k] >= 0.0 else -SMALL_SPEED
-            changed = self._forces(time, u, moved, tau_motor, tau_spring)
-            for k in side:
-                slope = (base[k] - changed[k]) / (moved[k] - w[k])
+        n = len(self._link)
+        self._set(time, 0.0, u, w, tau_motor, tau_spring)
+        base = self._act().tolist()
+        for side in (slice(0, n), slice(n, len(u))):
+            moved = w.copy()
+            moved[side] += np.where(w[side] >= 0.0, SMALL_SPEED, -SMALL_SPEED)
+            self._set(time, 0.0, u, moved, tau_motor, tau_spring)
+            changed = self._act().tolist()
+            for k in range(len(u))[side]:
+                slope = (changed[k] - base[k]) / (moved[k] - w[k])
                 if slope > 0.0:
                     damping[k, k] += slope
 
-    def _forces(
-        self, time: float, u: list[float], w: list[float], tau_motor: list[float], tau_spring: list[float]
-    ) -> list[float]:
-        out = [0.0] * len(u)
-        self.add(time, 0.0, u, w, list(tau_motor), list(tau_spring), out)
-        return out
-
     def accept(
-        self, time: float, u: list[float], w: list[float], tau_motor: list[float], tau_spring: list[float]
+        self, time: float, u: FloatArray, w: FloatArray, tau_motor: list[float], tau_spring: list[float]
     ) -> None:
         """Tell the effects with memory where the step ended; torques are those of the last stage."""
         if self._memory:
-            state = self._state(time, 0.0, u, w, tau_motor, tau_spring)
+            self._set(time, 0.0, u, w, tau_motor, tau_spring)
             for accept in self._memory:
-                accept(state)
+                accept(self._state)
 
 
 def altered_robot(robot: Robot, effects: Sequence[PlantedEffect]) -> Robot:

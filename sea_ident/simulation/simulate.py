@@ -115,6 +115,8 @@ def simulate(
         )
     ]
     planted = PlantedTorques(plant.robot, effects, follow.begin) if effects else None
+    if planted is not None and planted.idle:
+        planted = None
     system = ClosedLoop(plant, drive, motors, links, planted, method, clock.step)
     system.check_mass(state)
     system.accept(follow.begin - clock.duration, state)

@@ -1,0 +1,100 @@
+"""A plant out of a model: effects and the values of their parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects import Effect
+from sea_ident.exceptions import SimulationError
+from sea_ident.robot import Robot
+from sea_ident.simulation.friction import FrictionLaw, SmoothCoulomb
+from sea_ident.simulation.plant import Plant, PlantedEffect
+
+_AS_NUMBERS = {
+    "viscous_friction": ("viscous_friction",),
+    "coulomb_friction": ("coulomb_friction",),
+    "spring_stiffness": ("stiffness",),
+    "spring_stiffening": ("cubic_stiffness",),
+    "spring_damping": ("spring_damping",),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ModelPlant:
+    """What `simulate` needs to simulate a model: ``simulate(robot, reference, plant=m.plant, friction=m.friction,
+    effects=m.effects)``.
+
+    Attributes:
+        plant: bodies, rotors, springs and friction.
+        friction: (n,) friction laws, with the smoothing of the model.
+        effects: all other effects of the model.
+    """
+
+    plant: Plant
+    friction: tuple[FrictionLaw, ...]
+    effects: tuple[PlantedEffect, ...]
+
+
+def plant_from_model(robot: Robot, effects: Sequence[Effect], parameters: FloatArray) -> ModelPlant:
+    """The plant that behaves as a model says.
+
+    Args:
+        robot: the robot; what the model does not hold of bodies and rotors comes from its description.
+        effects: effects of the model.
+        parameters: (p,) values of all parameters in the order of the model's columns (standard inertial parameters
+            for the bodies, not base parameters).
+
+    Returns:
+        The plant, its friction laws and the effects that act beside it.
+
+    Raises:
+        SimulationError: wrong number of values, a value that is missing, a body without mass, a spring that the model
+            does not hold.
+    """
+    counts = [len(effect.columns(robot)) for effect in effects]
+    if parameters.shape != (sum(counts),):
+        raise SimulationError(f"the model has {sum(counts)} parameters, {parameters.shape} values were given")
+    if not np.all(np.isfinite(parameters)):
+        names = [c.name for effect in effects for c in effect.columns(robot)]
+        bad = int(np.flatnonzero(~np.isfinite(parameters))[0])
+        raise SimulationError(f"the model has no value for {names[bad]!r}; a simulation needs all of them")
+    n = robot.n
+    numbers = {name: np.zeros(n) for name in Plant.numbers()}
+    numbers["efficiency"][:] = 1.0
+    numbers["torque_constant"][:] = np.nan
+    for i, joint in enumerate(robot.joints):
+        if joint.actuator is not None:
+            numbers["efficiency"][i] = 1.0 if joint.actuator.efficiency is None else joint.actuator.efficiency
+            constant = joint.actuator.torque_constant
+            numbers["torque_constant"][i] = np.nan if constant is None else constant
+    friction: list[FrictionLaw] = [SmoothCoulomb() for _ in range(n)]
+    others: list[PlantedEffect] = []
+    inertial, rotors = robot.inertial_parameters, robot.rotor_inertias()
+    start = 0
+    for effect, count in zip(effects, counts, strict=True):
+        values = parameters[start : start + count]
+        start += count
+        if effect.name == "rigid_bodies":
+            inertial = values
+        elif effect.name == "rotor_inertia":
+            groups = robot.rotor_groups
+            rotors = np.array([values[groups.index(f"{rotor.rotor_group}.rotor_inertia")] for rotor in robot.rotors])
+        elif effect.name in _AS_NUMBERS and effect.shape_values.get("exponent", 3.0) == 3.0:
+            i = robot.index(str(effect.joint))
+            for name, value in zip(_AS_NUMBERS[effect.name], values, strict=True):
+                numbers[name][i] += value
+            if effect.name == "coulomb_friction":
+                friction[i] = SmoothCoulomb(effect.shape_values["smoothing"])
+        else:
+            others.append(PlantedEffect(effect, values))
+    masses = inertial[::10]
+    if np.any(masses == 0.0):
+        body = robot.bodies[int(np.flatnonzero(masses == 0.0)[0])]
+        raise SimulationError(
+            f"the model gives the mass 0 to the body {body!r}: first moments cannot be simulated then"
+        )
+    return ModelPlant(
+        Plant(robot.with_inertial_parameters(inertial, rotors), **numbers), tuple(friction), tuple(others)
+    )
