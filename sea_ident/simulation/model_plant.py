@@ -23,8 +23,7 @@ _AS_NUMBERS = {
 
 @dataclass(frozen=True, eq=False)
 class ModelPlant:
-    """What `simulate` needs to simulate a model: ``simulate(robot, reference, plant=m.plant, friction=m.friction,
-    effects=m.effects)``.
+    """What `simulate` needs to simulate a model m: ``plant=m.plant, friction=m.friction, effects=m.effects``.
 
     Attributes:
         plant: bodies, rotors, springs and friction.
@@ -89,12 +88,23 @@ def plant_from_model(robot: Robot, effects: Sequence[Effect], parameters: FloatA
                 friction[i] = SmoothCoulomb(effect.shape_values["smoothing"])
         else:
             others.append(PlantedEffect(effect, values))
-    masses = inertial[::10]
-    if np.any(masses == 0.0):
-        body = robot.bodies[int(np.flatnonzero(masses == 0.0)[0])]
-        raise SimulationError(
-            f"the model gives the mass 0 to the body {body!r}: first moments cannot be simulated then"
-        )
+    for k, body in enumerate(robot.bodies):
+        mass, moments = inertial[10 * k], inertial[10 * k + 1 : 10 * k + 4]
+        if mass == 0.0 and np.any(moments != 0.0):
+            raise SimulationError(f"the model gives body {body!r} first moments and no mass; give it one")
     return ModelPlant(
-        Plant(robot.with_inertial_parameters(inertial, rotors), **numbers), tuple(friction), tuple(others)
+        Plant(
+            robot.with_inertial_parameters(inertial, rotors),
+            numbers["viscous_friction"],
+            numbers["coulomb_friction"],
+            numbers["link_viscous_friction"],
+            numbers["link_coulomb_friction"],
+            numbers["stiffness"],
+            numbers["cubic_stiffness"],
+            numbers["spring_damping"],
+            numbers["efficiency"],
+            numbers["torque_constant"],
+        ),
+        tuple(friction),
+        tuple(others),
     )
