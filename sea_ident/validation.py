@@ -4,12 +4,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from sea_ident._typing import FloatArray
 from sea_ident.estimation import Model
 from sea_ident.exceptions import RecordingError
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
+
+AFTER_FORCE = 0.05
+"""Time [s] around an external force for which the filtered acceleration is not to be trusted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +44,7 @@ class Validation:
     samples: int
     processed: ProcessedRecording
     predicted: FloatArray
-    used: np.typing.NDArray[np.bool_]
+    used: NDArray[np.bool_]
     warnings: tuple[str, ...] = ()
 
     def summary(self) -> str:
@@ -101,13 +106,13 @@ def validate(
     used = np.ones(processed.samples, dtype=bool)
     found = list(processed.warnings)
     if "external_force" in processed.channels:
-        used = np.all(processed.channels["external_force"] == 0.0, axis=1)
+        used = _free(processed)
         if not np.any(used):
             raise RecordingError(f"{processed.source}: an external force acts at every sample; nothing can be compared")
         if not np.all(used):
             found.append(
                 f"{processed.source}: {np.count_nonzero(~used)} of {len(used)} samples are left out, where an external "
-                "force acts"
+                f"force acts or did within {AFTER_FORCE:g} s"
             )
     difference = (processed.tau_motor - predicted)[used]
     rms = np.sqrt(np.mean(difference**2, axis=0))
@@ -127,3 +132,10 @@ def validate(
         used=used,
         warnings=tuple(found),
     )
+
+
+def _free(processed: ProcessedRecording) -> NDArray[np.bool_]:
+    """(N,) where no external force acts nearby."""
+    pushed = np.any(processed.channels["external_force"] != 0.0, axis=1)
+    reach = int(np.ceil(AFTER_FORCE / processed.interval))
+    return ~np.asarray(binary_dilation(pushed, iterations=reach), dtype=bool)

@@ -5,10 +5,12 @@ from sea_ident.estimation.identify import identify
 from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
 from sea_ident.estimation.model_file import model_from_dict, read_model
 from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.physical import Box, PhysicalParameters, Pull, physical_parameters
 from sea_ident.estimation.springs import SpringResult, Verdict, identify_springs
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 
 __all__ = [
+    "Box",
     "CovarianceKind",
     "Estimate",
     "Estimator",
@@ -20,11 +22,14 @@ __all__ = [
     "Observations",
     "Parameter",
     "PerSampleWLS",
+    "PhysicalParameters",
+    "Pull",
     "SpringResult",
     "Uncertainty",
     "Verdict",
     "identify",
     "identify_springs",
     "model_from_dict",
+    "physical_parameters",
     "read_model",
 ]

@@ -12,36 +12,30 @@ ORDER = 4
 def choose_cutoff(values: FloatArray, interval: float) -> float:
     """Frequency up to which positions stand out of their noise.
 
-    The spectrum of the windowed second difference is that of the acceleration; above the cutoff it is noise, whose
-    level per frequency is that of a white position noise times the fourth power of frequency.
+    As for harmonics: what is kept brings its noise, what is left out its signal, both by the fourth power of frequency
+    in the acceleration. The noise is the level of the upper half of the spectrum.
 
     Args:
         values: (N, n) positions.
         interval: [s].
 
     Returns:
-        Cutoff [Hz], between 10 intervals of the record length and 0.2 of the sample rate.
+        Cutoff [Hz], between ten over the record length and 0.2 of the sample rate.
     """
     samples = len(values)
-    detrended = values - np.linspace(0.0, 1.0, samples)[:, None] * (values[-1] - values[0]) - values[0]
-    window = np.hanning(samples)[:, None] ** 2
-    power = np.abs(np.fft.rfft(detrended * window, axis=0)) ** 2
+    detrended = values - values[0] - np.linspace(0.0, 1.0, samples)[:, None] * (values[-1] - values[0])
+    power = np.abs(np.fft.rfft(detrended * np.hanning(samples)[:, None], axis=0)) ** 2
     frequency = np.fft.rfftfreq(samples, interval)
-    bands = np.array_split(np.arange(1, len(frequency)), min(400, max(len(frequency) // 8, 2)))
+    bands = np.array_split(np.arange(1, len(frequency)), min(800, max(len(frequency) // 8, 2)))
     level = np.array([power[band].mean(axis=0) for band in bands])
     centre = np.array([frequency[band].mean() for band in bands])
     floor = np.median(level[len(level) // 2 :], axis=0)
-    highest = 0.0
-    for i in range(values.shape[1]):
-        above = np.flatnonzero(level[:, i] > 10.0 * floor[i])
-        run = 0
-        for k in above:  # the first stretch without a gap
-            if k > run + 2:
-                break
-            run = int(k)
-        highest = max(highest, float(centre[run]))
-    lowest = 10.0 / (samples * interval)
-    return float(np.clip(1.5 * highest, lowest, 0.2 / interval))
+    weight = centre[:, None] ** 4
+    signal = np.where(level > 3.0 * floor, level - floor, 0.0)
+    kept = np.cumsum(weight * np.broadcast_to(floor, level.shape), axis=0)
+    lost = np.concatenate([np.cumsum((weight * signal)[::-1], axis=0)[::-1][1:], np.zeros((1, level.shape[1]))])
+    best = float(centre[np.argmin(kept + lost, axis=0)].max())
+    return float(np.clip(1.2 * best, 10.0 / (samples * interval), 0.2 / interval))
 
 
 def zero_phase(values: FloatArray, interval: float, cutoff: float, source: str) -> FloatArray:
