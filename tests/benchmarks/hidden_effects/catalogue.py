@@ -109,9 +109,7 @@ def _tilt(p: Place) -> tuple[float, float, dict[str, float]]:
 
 
 def _coupling(p: Place) -> tuple[float, float, dict[str, float]]:
-    inertia = 0.2 * p.gauge.truth.robot.rotor_inertias()[p.joint] * p.gauge.truth.robot.gear_ratios[p.joint] ** 2
-    shape = {"other": float(p.other), "ratio": p.sign() * float(p.rng.uniform(0.4, 1.0)), "viscous": 8.0}
-    return float(inertia), 20.0 * float(inertia), shape
+    return p.sign() * 0.1, 1.0, {"other": float(p.other)}
 
 
 def _order(p: Place, lower: float = 2.0, upper: float = 40.0) -> float:
@@ -188,7 +186,7 @@ LIBRARY: tuple[Entry, ...] = (
     Entry("link_flexibility", "library", lambda p: (
         0.1 / max(float(p.gauge.truth.stiffness[p.joint]), 100.0),
         2.0 / max(float(p.gauge.truth.stiffness[p.joint]), 100.0),
-        {"damping": 0.004, "inertia": 2e-3}), springs=True),
+        {"damping": 8e-4, "inertia": 3e-3}), springs=True),
     Entry("transmission_coupling", "library", _coupling, springs=True),
     Entry("encoder_offset", "library", lambda p: (p.sign() * 0.01, 0.15, {})),
     Entry("encoder_eccentricity", "library", lambda p: (0.005, 0.05, {"phase": p.phase()})),
@@ -261,8 +259,6 @@ def places(entry: Entry, gauge: Gauge) -> list[int]:
         return [0]
     if entry.effect == "payload":
         return [robot.n - 1]
-    if entry.effect == "transmission_coupling":
-        return [i for i in range(robot.n - 1)]
     return [i for i in range(robot.n) if robot.elastic[i] or not entry.springs]
 
 

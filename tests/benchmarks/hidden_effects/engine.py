@@ -114,6 +114,8 @@ def simulate_mujoco(
     """
     robot, n = truth.robot, truth.robot.n
     friction = friction or Friction()
+    if any(p.effect == "link_flexibility" for p in planted):
+        step = step / 4.0  # the small body between the two springs is fast
     per_period = round(series.period / step)
     stride = round(1.0 / (rate * step))
     first, total = settle * per_period, (settle + periods) * per_period
@@ -135,7 +137,11 @@ def simulate_mujoco(
         raise NotImplementedError("rigid joints with rotors are not simulated")
     iq = [dof(name) for name in robot.joint_names]
     it = [dof(f"{name} rotor") if e else iq[i] for i, (name, e) in enumerate(zip(robot.joint_names, elastic, strict=True))]
-    soft = [(dof(f"{p.joint} flexibility"), robot.index(p.joint)) for p in planted if p.effect == "link_flexibility"]
+    soft = [
+        (dof(f"{p.joint} flexibility"), robot.index(str(p.joint)), p.size)
+        for p in planted
+        if p.effect == "link_flexibility"
+    ]
     gear = [float(g) if e else 1.0 for g, e in zip(robot.gear_ratios, elastic, strict=True)]
 
     time = np.arange(per_period) * step
@@ -166,8 +172,8 @@ def simulate_mujoco(
         if elastic[i]:
             x[it[i]] = gear[i] * float(theta_reference[0, i])
             v[it[i]] = gear[i] * float(rate_reference[0, i])
-    for k, i in soft:
-        x[k] = -float(truth.stiffness[i] * (theta_reference[0, i] - start_q[i])) * 0.0
+    for k, i, compliance in soft:
+        x[k] = -compliance * float(truth.stiffness[i] * (theta_reference[0, i] - start_q[i]))
 
     k1, k3, damping = truth.stiffness.tolist(), truth.cubic.tolist(), truth.damping.tolist()
     viscous, coulomb = truth.viscous.tolist(), truth.coulomb.tolist()
@@ -215,7 +221,8 @@ def simulate_mujoco(
             s, h = states[i], hooks[i]
             spring = s.ts if elastic[i] else 0.0
             b = viscous[i] if h.viscous is None else h.viscous(s, viscous[i])
-            resisting = b * s.dth + extra_motor[i]
+            carried = 0.0 if h.turned is None else h.turned[1] * states[h.turned[0]].dq
+            resisting = b * (s.dth + carried) + extra_motor[i]
             for smooth in h.smooth:
                 resisting += smooth(s)
             level = coulomb[i]
@@ -233,7 +240,7 @@ def simulate_mujoco(
             if h.bristle is not None:
                 f = h.bristle(s, level)
             elif level > 0.0:
-                ahead = v[it[i]] / gear[i] + step * (free / m - coupling[i])
+                ahead = v[it[i]] / gear[i] + step * (free / m - coupling[i]) + carried
                 f = ahead / (smoothing / level + step / m)
                 if f > level:
                     f = level
@@ -250,6 +257,8 @@ def simulate_mujoco(
             else:
                 f = 0.0
             f_motor[i] = f + resisting
+            if h.turned is not None:
+                force[iq[h.turned[0]]] -= h.turned[1] * (f + b * (s.dth + carried))
             net[i] = free - f
             force[it[i]] += net[i] / gear[i]
             push = spring - extra_link[i]
@@ -308,7 +317,7 @@ def _structure(
             stiffness = 1.0 / max(p.size, 1e-12)
             flexibilities.append(Flexibility(str(p.joint), stiffness, p.shape["damping"] * stiffness, p.shape["inertia"]))
         elif p.effect == "transmission_coupling":
-            couplings.append(Coupling(str(p.joint), names[int(p.shape["other"])], p.shape["ratio"], p.size))
+            couplings.append(Coupling(str(p.joint), names[int(p.shape["other"])], p.size))
     return tuple(payloads), tuple(flexibilities), tuple(couplings)
 
 

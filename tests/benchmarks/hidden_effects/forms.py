@@ -42,7 +42,8 @@ class Hooks:
         link_coulomb: Coulomb friction at the link [N m].
         drive: torque that the drive delivers for the torque that is recorded.
         viscous: factor of the viscous friction over time.
-        stiffness: factor of the spring over time.
+        temperature: of the motor over time [degC].
+        turned: joint j and ratio r where the motor turns with theta + r q_j.
     """
 
     spring: list[Change] = field(default_factory=list)
@@ -53,11 +54,8 @@ class Hooks:
     link_coulomb: float = 0.0
     drive: Change | None = None
     viscous: Change | None = None
-    stiffness: Change | None = None
     temperature: Callable[[float], float] | None = None
-
-
-TREND_KINDS = {0: "linear", 1: "warming"}
+    turned: tuple[int, float] | None = None
 
 
 def trend(kind: float, duration: float) -> Callable[[float], float]:
@@ -307,16 +305,9 @@ def _parallel_spring(p, truth, i, hooks, wide, step, duration):  # type: ignore[
     hooks[i].link.append(lambda s: k * (s.q - rest))
 
 
-def _coupled_friction(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
-    """Friction of a stage that turns with v_i + r v_j; its inertia is a tendon's in the MJCF."""
-    j, r, b = int(p.shape["other"]), p.shape["ratio"], p.size * p.shape["viscous"]
-
-    def law(s: list[JointState], link: list[float], motor: list[float]) -> None:
-        f = b * (s[i].dth + r * s[j].dth)
-        motor[i] += f
-        motor[j] += r * f
-
-    wide.append(law)
+def _coupled(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
+    """A stage that turns with theta_i + r q_j; its inertia is a tendon's in the MJCF, its friction follows here."""
+    hooks[i].turned = (int(p.shape["other"]), p.size)
 
 
 # -- what the library does not have ----------------------------------------------------------------------------------
@@ -406,7 +397,7 @@ _FORMS = {
     ("stiffness_drift", "library"): _drifting_spring,
     ("link_friction", "library"): _link_friction,
     ("parallel_spring", "library"): _parallel_spring,
-    ("transmission_coupling", "library"): _coupled_friction,
+    ("transmission_coupling", "library"): _coupled,
     ("soft_stop", "library"): _soft_stop,
     ("viscous_position", "library"): _viscous_position,
     ("mesh_ripple", "library"): _mesh_ripple,

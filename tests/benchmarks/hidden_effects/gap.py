@@ -15,7 +15,8 @@ from tests.benchmarks.hidden_effects.sensors import signals
 
 BANDWIDTH = 15.0
 TREND_EFFECTS = ("friction_drift", "temperature_friction", "torque_constant_drift", "stiffness_drift")
-ABSORBED_EFFECTS = ("payload", "common_torque_constant", "changed_inertia", "torque_constant")
+SENSOR_EFFECTS = ("encoder_offset", "encoder_eccentricity", "position_delay")
+ABSORBED_EFFECTS = ("payload", "common_torque_constant", "changed_inertia")
 
 
 def base_model(robot: Robot, smoothing: float) -> tuple[Effect, ...]:
@@ -28,13 +29,14 @@ def base_model(robot: Robot, smoothing: float) -> tuple[Effect, ...]:
 
 
 def base_residual(
-    robot: Robot, clean: dict[str, FloatArray], period: float, smoothing: float
+    robot: Robot, clean: dict[str, FloatArray], motion: Motion | None, period: float, smoothing: float
 ) -> tuple[FloatArray, FloatArray]:
     """What the base model leaves of one noise-free period, band-limited.
 
     Args:
         robot: the robot; its numbers are not used.
         clean: signals (N, n) of one period.
+        motion: exact motion; None to differentiate the signals, where a sensor shows another motion.
         period: [s].
         smoothing: of the friction [rad/s].
 
@@ -52,8 +54,9 @@ def base_residual(
         return np.fft.irfft(spectrum * window, samples, axis=0)
 
     time = np.arange(samples) * (period / samples)
-    q, theta = ([smooth(clean[name], d) for d in range(3)] for name in ("q", "theta"))
-    motion = Motion(time, *q, *theta)
+    if motion is None:
+        q, theta = ([smooth(clean[name], d) for d in range(3)] for name in ("q", "theta"))
+        motion = Motion(time, *q, *theta)
     regressor = build_regressor(robot, base_model(robot, smoothing), motion)
     tau = smooth(clean["tau_motor"])
     scale = np.sqrt(np.mean(tau**2, axis=0))
@@ -86,15 +89,15 @@ class Gauge:
         self.friction = replace(friction, jitter=0.0)
         self.exact = self._simulate(())
         self.clean = signals(self.exact, truth, ())
-        self.floor = self._residual(self.clean)
+        self.floors = {exact: self._residual(self.clean, self.exact.motion if exact else None) for exact in (True, False)}
 
     def _simulate(self, planted: tuple[Planted, ...]) -> Exact:
         return simulate_mujoco(
             self.truth, self.series, 1, planted=planted, friction=self.friction, settle=self.settle
         )
 
-    def _residual(self, clean: dict[str, FloatArray]) -> FloatArray:
-        return np.stack(base_residual(self.truth.robot, clean, self.series.period, self.friction.smoothing))
+    def _residual(self, clean: dict[str, FloatArray], motion: Motion | None) -> FloatArray:
+        return np.stack(base_residual(self.truth.robot, clean, motion, self.series.period, self.friction.smoothing))
 
     def torque_rms(self) -> FloatArray:
         """(n,) rms of the motor torques [N m]."""
@@ -113,7 +116,9 @@ class Gauge:
         clean = signals(exact, self.truth, (planted,))
         change = np.sqrt(np.mean((clean["tau_motor"] - self.clean["tau_motor"]) ** 2, axis=0)) / self.torque_rms()
         share = float(change.max())
-        excess = np.sqrt(np.maximum(self._residual(clean) ** 2 - self.floor**2, 0.0))
+        known = planted.effect not in SENSOR_EFFECTS
+        residual = self._residual(clean, exact.motion if known else None)
+        excess = np.sqrt(np.maximum(residual**2 - self.floors[known] ** 2, 0.0))
         gap = share if planted.effect in ABSORBED_EFFECTS else float(excess.max())
         return replace(planted, gap=gap, torque_share=share)
 
@@ -126,8 +131,8 @@ class Gauge:
             wave = truth.stiffness[i] * (motion.deflection[:, i])
         else:
             wave = self.exact.tau_motor[:, i]
-        size = float(np.sqrt(np.mean(wave**2))) / float(self.torque_rms()[i])
-        return abs(planted.size) * size / np.sqrt(12.0)
+        size = float(np.sqrt(np.mean(wave**2)) / self.torque_rms()[i])
+        return float(abs(planted.size) * size / np.sqrt(12.0))
 
     def scaled_to(self, planted: Planted, target: float, largest: float) -> Planted | None:
         """The effect with the size that leaves a wanted gap.

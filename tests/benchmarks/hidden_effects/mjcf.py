@@ -46,19 +46,20 @@ class Flexibility:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A further rotor that turns with the sum of two motor angles.
+    """A motor whose stage turns with its own joint and with another link.
 
     Attributes:
-        first: joint.
-        second: joint.
-        ratio: r in theta_first + r theta_second [-].
-        inertia: reflected to the joint side of the first [kg m2].
+        joint: joint of the motor.
+        other: joint that it passes.
+        ratio: r in theta + r q_other [-].
     """
 
-    first: str
-    second: str
+    joint: str
+    other: str
     ratio: float
-    inertia: float
+
+
+COUPLED_SHARE = 0.8
 
 
 def build_mjcf(
@@ -89,6 +90,9 @@ def build_mjcf(
     for k in range(1, model.njoints):
         children[int(model.parents[k])].append(k)
     flexible = {f.joint: f for f in flexibilities}
+    coupled = {f"{c.joint} rotor" for c in couplings}
+    gears = {rotor.joint: float(rotor.gear_ratio) for rotor in robot.rotors}
+    spins = {rotors[k].joint: float(model.inertias[k].inertia[2, 2]) for k in rotors}
 
     def inertial(mass: float, centre: FloatArray, about_centre: FloatArray) -> str:
         i = about_centre
@@ -137,6 +141,9 @@ def build_mjcf(
 
     def rotor(k: int, mass: float, transverse: float, position: FloatArray) -> str:
         spin = float(model.inertias[k].inertia[2, 2])
+        if model.names[k] in coupled:  # most of its inertia turns with another joint too
+            transverse, spin = 0.7 * spin, (1.0 - COUPLED_SHARE) * spin
+            transverse = max(transverse, 0.5 * spin)
         moments = np.diag([transverse, transverse, spin])
         placement = pin.SE3(model.jointPlacements[k].rotation, position)
         joint = f'<joint name="{model.names[k]}" type="hinge" axis="0 0 1"/>'
@@ -146,11 +153,10 @@ def build_mjcf(
     grounded = "".join(rotor(c, 0.1, 0.7 * float(model.inertias[c].inertia[2, 2]), np.zeros(3))
                        for c in children[0] if c in rotors)  # fmt: skip
     world = grounded + "".join(link(c) for c in children[0] if c not in rotors)
-    gears = {rotor.joint: rotor.gear_ratio for rotor in robot.rotors}
     tendons = "".join(
-        f'<fixed name="{c.first} {c.second}" armature="{c.inertia!r}">'
-        f'<joint joint="{c.first} rotor" coef="{1.0 / gears[c.first]!r}"/>'
-        f'<joint joint="{c.second} rotor" coef="{c.ratio / gears[c.second]!r}"/></fixed>'
+        f'<fixed name="{c.joint} {c.other}" armature="{COUPLED_SHARE * spins[c.joint] * gears[c.joint] ** 2!r}">'
+        f'<joint joint="{c.joint} rotor" coef="{1.0 / gears[c.joint]!r}"/>'
+        f'<joint joint="{c.other}" coef="{c.ratio!r}"/></fixed>'
         for c in couplings
     )
     gravity = _text(model.gravity.linear)

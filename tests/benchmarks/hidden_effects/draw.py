@@ -1,0 +1,198 @@
+"""Cases from a seed: rows of the table, effects, places, sizes, noise."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident.motion import FourierSeries
+from tests.benchmarks.hidden_effects.case import Case, Noise, Planted, generator
+from tests.benchmarks.hidden_effects.catalogue import (
+    LIBRARY,
+    OTHER_FORMS,
+    REFERENCE,
+    UNKNOWN,
+    Entry,
+    draw_effect,
+    places,
+)
+from tests.benchmarks.hidden_effects.engine import Friction
+from tests.benchmarks.hidden_effects.gap import TREND_EFFECTS, Gauge
+from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
+from tests.benchmarks.hidden_effects.trajectories import draw_trajectory
+
+SMALL_SHARE = 0.15
+PROJECT_ENGINE_SHARE = 0.15
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the table.
+
+    Attributes:
+        name: name.
+        title: what the table calls it.
+        number: stands for the row in seeds.
+        entries: what can be hidden.
+        weak: whether the excitation is weak.
+    """
+
+    name: str
+    title: str
+    number: int
+    entries: tuple[Entry, ...] = ()
+    weak: bool = False
+
+
+ROWS = {
+    row.name: row
+    for row in (
+        Row("none", "nothing missing, P = 20 and 10", 0),
+        Row("one", "one effect, gap >= 1 % of torque", 1, LIBRARY),
+        Row("one_small", "same at 15 % size", 2, LIBRARY),
+        Row("two", "two at once", 3, LIBRARY),
+        Row("main_small", "one main effect and up to five small ones", 4, LIBRARY),
+        Row("unknown", "effect not in the library", 5, UNKNOWN),
+        Row("removed", "true effect taken out of the library", 6, LIBRARY),
+        Row("other_form", "form differs from the library", 7, OTHER_FORMS),
+        Row("weak", "weak excitation", 8, LIBRARY, weak=True),
+        Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
+    )
+}
+
+
+def row_generator(seed: int, row: str, index: int, purpose: int = 0) -> np.random.Generator:
+    """Random numbers of one case; one stream per purpose."""
+    return generator(seed, ROWS[row].number, index, purpose)
+
+
+def truth_of(case: Case) -> Truth:
+    """The robot of a case."""
+    return drawn_truth(case.robot, row_generator(case.seed, case.row, case.index, 1))
+
+
+def trajectories_of(case: Case) -> tuple[FourierSeries, FourierSeries]:
+    """Trajectory of the training and of the held-out recording."""
+    rng = row_generator(case.seed, case.row, case.index, 2)
+    return (
+        draw_trajectory(case.robot, case.period, rng, weak=case.weak),
+        draw_trajectory(case.robot, case.period, rng),
+    )
+
+
+def settling(robot: str) -> int:
+    """Periods until a robot moves periodically."""
+    return 2 if robot == "baxter" else 1
+
+
+def draw_case(seed: int, row: str, index: int) -> Case:
+    """Draw a case.
+
+    Args:
+        seed: of the run.
+        row: name in `ROWS`.
+        index: number of the case within the row.
+
+    Returns:
+        The case, with sizes that leave the wanted gaps.
+
+    Raises:
+        RuntimeError: nothing could be hidden in it.
+    """
+    what, rng = ROWS[row], row_generator(seed, row, index)
+    # one in ten on the arm with springs, one in ten on the rigid arm, in an order of its own for every row
+    robot = {3: "baxter", 7: "ur5"}.get((index + 3 * what.number) % 10, "exo_leg")
+    form = str(rng.choice(["ramp", "tanh"]))
+    case = Case(
+        row=row,
+        seed=seed,
+        index=index,
+        robot=robot,
+        engine="mujoco",
+        period=float(rng.choice([4.0, 5.0, 8.0] if robot == "exo_leg" else [5.0, 8.0])),
+        periods=20 if row != "none" or index % 2 == 0 else 10,
+        holdout_periods=10,
+        weak=what.weak,
+        channel="current" if rng.random() < 0.25 else "tau_motor",
+        friction_form=form,
+        friction_smoothing=_log(rng, 0.003, 0.02),
+        noise=Noise(
+            link_encoder=_log(rng, 5e-6, 4e-5),
+            motor_encoder=_log(rng, 2e-6, 1.5e-5),
+            link_step=2.0 * np.pi / 2.0 ** float(rng.integers(18, 21)),
+            motor_step=2.0 * np.pi / 2.0 ** float(rng.integers(18, 22)),
+            torque=_log(rng, 0.003, 0.02),
+            actuator=_log(rng, 0.0005, 0.003),
+            jitter=_log(rng, 0.02, 0.2),
+            jitter_speed=_log(rng, 0.03, 0.1),
+        ),
+        planted=(),
+        reference=row == "reference",
+    )
+    if not what.entries:
+        return replace(case, engine="project" if rng.random() < PROJECT_ENGINE_SHARE else "mujoco")
+    gauge = Gauge(truth_of(case), trajectories_of(case)[0], friction_without_jitter(case), settling(robot))
+    planted = _hide(case, gauge, rng)
+    if row in ("one", "one_small", "two", "removed") and rng.random() < PROJECT_ENGINE_SHARE:
+        case = replace(case, engine="project")
+    forbidden = tuple(p.effect for p in planted) if row == "removed" else ()
+    return replace(case, planted=planted, forbidden=forbidden)
+
+
+def friction_without_jitter(case: Case) -> Friction:
+    """Base friction of a case, every pass alike."""
+    return Friction(case.friction_form, case.friction_smoothing)
+
+
+def _hide(case: Case, gauge: Gauge, rng: np.random.Generator) -> tuple[Planted, ...]:
+    row, entries = case.row, ROWS[case.row].entries
+    if row == "two":
+        first = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), case.index)
+        second = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), None, (first,))
+        return first, second
+    if row == "main_small":
+        found = [_one(case, gauge, rng, entries, _log(rng, 0.025, 0.06), case.index)]
+        for _ in range(int(rng.integers(1, 6))):
+            target = found[0].gap * rng.uniform(0.05, 0.15)
+            small = _one(case, gauge, rng, entries, target, None, tuple(found))
+            found.append(replace(small, small=True))
+        return tuple(found)
+    planted = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), case.index)
+    if row == "one_small":
+        planted = gauge.measure(replace(planted, size=SMALL_SHARE * planted.size))
+    return (planted,)
+
+
+def _one(
+    case: Case,
+    gauge: Gauge,
+    rng: np.random.Generator,
+    entries: tuple[Entry, ...],
+    target: float,
+    turn: int | None,
+    beside: tuple[Planted, ...] = (),
+) -> Planted:
+    """One effect: all take turns where a turn is given, in an order that the seed decides."""
+    order = generator(case.seed, ROWS[case.row].number, 10**6).permutation(len(entries))
+    start = int(rng.integers(len(entries))) if turn is None else turn
+    taken = {p.name for p in beside}
+    # two effects of one kind or two trends on one joint are one effect to anybody who looks at data
+    trending = {p.joint for p in beside if p.effect in TREND_EFFECTS}
+    for step in range(len(entries)):
+        entry = entries[int(order[(start + step) % len(entries)])]
+        if len(gauge.truth.robot.elastic_indices) == 0 and (entry.springs or entry.effect == "transmission_coupling"):
+            continue
+        for joint in rng.permutation(places(entry, gauge))[:3]:
+            name = None if entry.whole else gauge.truth.robot.joint_names[int(joint)]
+            if (entry.effect, name) in taken or (entry.effect in TREND_EFFECTS and name in trending):
+                continue
+            try:
+                planted = draw_effect(entry, gauge, int(joint), target, rng)
+            except FloatingPointError:
+                continue
+            if planted is not None:
+                return planted
+    raise RuntimeError(f"{case.label}: nothing could be hidden")
+
+
+def _log(rng: np.random.Generator, lower: float, upper: float) -> float:
+    return float(np.exp(rng.uniform(np.log(lower), np.log(upper))))
