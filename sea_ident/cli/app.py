@@ -58,6 +58,9 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: object) -
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    # The matrices are small: threads inside the linear algebra would wait for each other, not work.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     warnings.simplefilter("once", SeaIdentWarning)
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     # A polite kill unwinds like Ctrl-C, so that temporary files are removed.

@@ -65,7 +65,7 @@ def variance_and_velocity(processed: ProcessedRecording, joint: str, path: Path)
     other.plot(time, processed.raw_tau_variance[half, i], color=_GREEN, lw=0.6, alpha=0.5)
     other.plot(time, processed.tau_variance[half, i], color=_GREEN, lw=1.6)
     other.set_ylabel("torque variance [(N m)\N{SUPERSCRIPT TWO}]", color=_GREEN)
-    other.set_ylim(bottom=0.0)
+    other.set_yscale("log")
     axes.set_title(f"Motor velocity and torque variance of the {joint}")
     axes.margins(x=0)
     _save(figure, path)
@@ -91,26 +91,30 @@ def angles(processed: ProcessedRecording, planned: FourierSeries, path: Path) ->
 
 
 def side_view(robot: Robot, motion: Motion, path: Path, *, shown: int = 9) -> None:
-    """The robot seen along y at moments of a trajectory, the latest darkest, with the path of its last body."""
+    """The robot seen along y at moments of a trajectory, the last in colour, with the path of its last body."""
     scene = build_scene(robot, motion.time, motion.q, periodic=True)
-    count = len(scene.poses)
     figure = _figure(5.0, 6.2)
     axes = figure.add_subplot()
-    moments = np.linspace(0, count - 1, shown).astype(int)
+    moments = np.linspace(0, len(scene.poses) - 1, shown).astype(int)
     for order, k in enumerate(moments):
-        alpha = 0.10 + 0.75 * (order / (shown - 1)) ** 2
+        now = order == shown - 1
         for part in scene.parts:
-            if part.body < 0 and order < shown - 1:
+            if part.body < 0 and not now:
                 continue
             vertices = part.vertices
             if part.body >= 0:
                 pose = scene.poses[k, part.body]
                 vertices = vertices @ pose[:, :3].T + pose[:, 3]
-            color = tuple(c / 255.0 for c in part.color)
-            axes.add_collection(
-                PolyCollection([_outline(vertices[:, [0, 2]])], facecolors=[color], edgecolors="white",
-                               linewidths=0.3, alpha=alpha, zorder=order)
-            )  # fmt: skip
+            color = tuple(c / 255.0 for c in part.color) if now else "#8fa3b8"
+            outline = PolyCollection(
+                [_outline(vertices[:, [0, 2]])],
+                facecolors=[color],
+                edgecolors="white" if now else "none",
+                linewidths=0.4,
+                alpha=1.0 if now else 0.16,
+                zorder=order,
+            )
+            axes.add_collection(outline)
     last = scene.poses.shape[1] - 1
     tip = np.mean([part.vertices.mean(axis=0) for part in scene.parts if part.body == last], axis=0)
     path_of_tip = scene.poses[:, last, :, :3] @ tip + scene.poses[:, last, :, 3]

@@ -136,7 +136,8 @@ def run_demo(
     joint_gait, sample_gait = validate(joint_model, walked), validate(model, walked)
 
     parameters = parameter_table(model)
-    performance = performance_table(excitation, joint_model, model, joint_gait, sample_gait, processed.motion)
+    exact = walking.tau_motor.reshape(periods, -1, robot.n).mean(axis=0)
+    performance = performance_table(excitation, joint_model, model, joint_gait, sample_gait, processed.motion, exact)
     _write_tables(parameters, performance, target("tables.md"), target("tables.json"))
     tell(85, "drawing")
     pictures.torque_of_periods(processed, "hip", target("figure_1a_torque.png"))

@@ -83,6 +83,7 @@ def performance_table(
     gait_by_joint: Validation,
     gait_by_sample: Validation,
     motion: Motion,
+    exact_torque: FloatArray,
 ) -> tuple[PerformanceRow, ...]:
     """Information and prediction of the two weightings (paper, table II).
 
@@ -93,6 +94,7 @@ def performance_table(
         gait_by_joint: prediction of the gait by the former.
         gait_by_sample: prediction of the gait by the latter.
         motion: (N, n) mean measured motion.
+        exact_torque: (M, n) torque of the gait without the noise of the sensors, which only a simulation knows [N m].
 
     Returns:
         The rows. Planned and measured compare the reduced model of eq. 14, the only one known when planning.
@@ -114,8 +116,11 @@ def performance_table(
                 float(gait_by_joint.rms[i]), float(gait_by_sample.rms[i]),
             )
         )  # fmt: skip
-    total = [float(np.sqrt(np.mean(v.rms**2))) for v in (gait_by_joint, gait_by_sample)]
+    pair = (gait_by_joint, gait_by_sample)
+    total = [float(np.sqrt(np.mean(v.rms**2))) for v in pair]
     rows.append(PerformanceRow("gait torque rms, all joints [N m]", None, None, total[0], total[1]))
+    exact = [float(np.sqrt(np.mean((v.predicted - exact_torque) ** 2))) for v in pair]
+    rows.append(PerformanceRow("the same against the exact torque [N m]", None, None, exact[0], exact[1]))
     return tuple(rows)
 
 
