@@ -13,6 +13,7 @@ linear in z. So is its torque: ``Y = J' F z`` with a constant F, and
 where a column of J upstream of joint k turns with it: dJ_j/dq_k = J_j x J_k for j < k.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,14 +64,21 @@ _WRENCH = _wrench_tensor()
 
 def _cross(x: FloatArray, y: FloatArray) -> FloatArray:
     """Cross product along axis 1, broadcasting over the others."""
+    out = np.empty(np.broadcast_shapes(x.shape, y.shape))
     x0, x1, x2 = x[:, 0], x[:, 1], x[:, 2]
     y0, y1, y2 = y[:, 0], y[:, 1], y[:, 2]
-    return np.stack([x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0], axis=1)
+    np.subtract(x1 * y2, x2 * y1, out=out[:, 0])
+    np.subtract(x2 * y0, x0 * y2, out=out[:, 1])
+    np.subtract(x0 * y1, x1 * y0, out=out[:, 2])
+    return out
 
 
 def _motion_cross(x: FloatArray, y: FloatArray) -> FloatArray:
     """Cross product of spatial motions (linear, angular) along axis 1, broadcasting over the others."""
-    return np.concatenate([_cross(x[:, 3:], y[:, :3]) + _cross(x[:, :3], y[:, 3:]), _cross(x[:, 3:], y[:, 3:])], axis=1)
+    out = np.empty(np.broadcast_shapes(x.shape, y.shape))
+    np.add(_cross(x[:, 3:], y[:, :3]), _cross(x[:, :3], y[:, 3:]), out=out[:, :3])
+    out[:, 3:] = _cross(x[:, 3:], y[:, 3:])
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +92,8 @@ class BodyColumns:
         axes: (J, 6) motion subspace of each joint in its own frame (linear, angular).
         paths: joints from the root to each joint, itself included.
         gravity: (3,) [m/s2].
-        wanted: parameters (0..9) of each body that are among the columns.
-        places: where these stand among the columns.
+        tensors: (6, r, 12) wrench of each body's columns, linear in z.
+        places: (r,) column to which each of these adds.
         count: number of columns p.
     """
 
@@ -95,7 +103,7 @@ class BodyColumns:
     axes: FloatArray
     paths: tuple[IntArray, ...]
     gravity: FloatArray
-    wanted: tuple[IntArray, ...]
+    tensors: tuple[FloatArray, ...]
     places: tuple[IntArray, ...]
     count: int
 
@@ -110,16 +118,33 @@ class BodyColumns:
         Returns:
             The columns.
         """
-        joints = model.njoints
+        bodies = parameters // 10 + 1
+        tensors = [_WRENCH[:, parameters[bodies == k] % 10] for k in range(model.njoints)]
+        places = [np.flatnonzero(bodies == k) for k in range(model.njoints)]
+        return BodyColumns._build(model, tensors, places, len(parameters))
+
+    @staticmethod
+    def torque(model: pin.Model) -> "BodyColumns":
+        """The torque of a model with its own inertial parameters, as a single column."""
+        tensors = [np.zeros((6, 0, 12))]
+        for k in range(1, model.njoints):
+            values = model.inertias[k].toDynamicParameters()
+            tensors.append(np.einsum("abc,b->ac", _WRENCH, values)[:, None, :])
+        places = [np.zeros(tensor.shape[1], dtype=np.intp) for tensor in tensors]
+        return BodyColumns._build(model, tensors, places, 1)
+
+    @staticmethod
+    def _build(
+        model: pin.Model, tensors: Sequence[FloatArray], places: Sequence[IntArray], count: int
+    ) -> "BodyColumns":
         data = model.createData()
         pin.computeJointJacobians(model, data, np.zeros(model.nq))
-        axes = np.zeros((joints, 6))
+        axes = np.zeros((model.njoints, 6))
         paths: list[IntArray] = [np.zeros(0, dtype=np.intp)]
-        for k in range(1, joints):
+        for k in range(1, model.njoints):
             jacobian = pin.getJointJacobian(model, data, k, pin.ReferenceFrame.LOCAL)
             axes[k] = jacobian[:, model.joints[k].idx_v]
             paths.append(np.append(paths[model.parents[k]], k))
-        bodies = parameters // 10 + 1
         return BodyColumns(
             parents=tuple(int(parent) for parent in model.parents),
             rotations=np.array([placement.rotation for placement in model.jointPlacements]),
@@ -127,9 +152,9 @@ class BodyColumns:
             axes=axes,
             paths=tuple(paths),
             gravity=np.array(model.gravity.linear),
-            wanted=tuple(parameters[bodies == k] % 10 for k in range(joints)),
-            places=tuple(np.flatnonzero(bodies == k) for k in range(joints)),
-            count=len(parameters),
+            tensors=tuple(tensors),
+            places=tuple(places),
+            count=count,
         )
 
     @property
@@ -162,14 +187,14 @@ class BodyColumns:
             path = self.paths[body]
             jacobian, gravity = self._step(body, x[:, body - 1], jacobians.get(parent), weight.get(parent, root))
             jacobians[body], weight[body] = jacobian, gravity
-            if not len(self.wanted[body]):
+            if not len(self.places[body]):
                 continue
             rows, take = path - 1, self.places[body]
             column, slope = self._body(body, jacobian, gravity, v[:, rows], a[:, rows], derivatives)
-            columns[:, rows[:, None], take] = column
+            columns[:, rows[:, None], take] += column
             if derivatives:
                 states = np.concatenate([rows, rows + joints, rows + 2 * joints])
-                slopes[:, rows[:, None, None], take[:, None], states] = slope
+                slopes[:, rows[:, None, None], take[:, None], states] += slope
         return columns, slopes
 
     def _step(
@@ -196,7 +221,7 @@ class BodyColumns:
     ) -> tuple[FloatArray, FloatArray]:
         """(N, m, r) columns of one body and (N, m, r, 3 m) derivatives, along its path."""
         samples, _, depth = jacobian.shape
-        tensor = _WRENCH[:, self.wanted[body]]
+        tensor = self.tensors[body]
         r = tensor.shape[1]
         moving = jacobian * v[:, None]
         velocity = np.cumsum(moving, axis=2)  # (N, 6, m) of each joint's own body, in this frame

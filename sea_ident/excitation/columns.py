@@ -109,7 +109,8 @@ class ModelColumns:
             theta = (motion.theta, motion.dtheta, motion.ddtheta)
 
         def at(link_part: FloatArray, motor_part: FloatArray) -> FloatArray:
-            return link_part @ link.T + (0.0 if motor is None else motor_part @ motor.T)
+            whole: FloatArray = link_part @ link.T
+            return whole if motor is None else whole + motor_part @ motor.T
 
         column, slope = bodies.evaluate(
             at(motion.q, theta[0]) + offset, at(motion.dq, theta[1]), at(motion.ddq, theta[2]), derivatives=derivatives
@@ -130,7 +131,8 @@ class ModelColumns:
         """(rotors, chosen groups) membership."""
         names = self.robot.rotor_groups
         of = [names.index(f"{rotor.rotor_group}.rotor_inertia") for rotor in self.robot.rotors]
-        return (np.array(of)[:, None] == which[None, :]).astype(float)
+        membership: FloatArray = (np.array(of)[:, None] == which[None, :]).astype(np.float64)
+        return membership
 
     def _fold(self, rows: FloatArray, link: FloatArray, motor: FloatArray | None) -> FloatArray:
         """From rows of coordinates (N, nv, ...) to sums or link and motor rows."""
@@ -189,7 +191,8 @@ class ModelColumns:
     def _rows(self, effect: Effect, motion: Motion) -> FloatArray:
         whole = motion if self.elastic else Motion.rigid(motion.time, motion.q, motion.dq, motion.ddq)
         part = effect.evaluate(State(self.robot, whole))
-        return np.concatenate([part.link, part.motor], axis=1) if self.separate else part.link + part.motor
+        rows: FloatArray = np.concatenate([part.link, part.motor], axis=1) if self.separate else part.link + part.motor
+        return rows
 
     def _differences(self, effect: Effect, which: IntArray, motion: Motion) -> FloatArray:
         """Central differences, for effects that say nothing about their derivatives."""

@@ -1,36 +1,75 @@
-"""Whether limits can hold together, a point well inside them, and random starts.
+"""Whether limits can hold together, a position well inside them, and trajectories repaired into them.
 
 A trajectory that keeps limits which are linear in the coefficients keeps them on average, and the average is a
-constant: if any trajectory is inside, one at rest is. So feasibility is a linear program in the n positions.
+constant: if any trajectory is inside, one at rest is. So their feasibility is a linear program in the n positions.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import InfeasibleError
-from sea_ident.excitation.ascent import Problem, constrained_step, grid_cuts, pull_inside
 from sea_ident.excitation.linear_limits import LinearLimits
+from sea_ident.excitation.quadratic import solve_quadratic
+from sea_ident.excitation.walls import Wall
+from sea_ident.motion import FourierSeries
+
+_CUT_ROUNDS = 3
 
 
-def _one_sided(limits: LinearLimits) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Position limits at rest as ``rows q <= bounds`` with the limit that each row belongs to."""
-    position = np.flatnonzero(limits.derivative == 0)
-    rows, bounds, owner = [], [], []
-    for k in position:
-        if np.isfinite(limits.upper[k]):
-            rows.append(limits.joints[k])
-            bounds.append(limits.upper[k])
-            owner.append(int(k))
-        if np.isfinite(limits.lower[k]):
-            rows.append(-limits.joints[k])
-            bounds.append(-limits.lower[k])
-            owner.append(int(k))
-    n = limits.joints.shape[1]
-    return np.array(rows).reshape(len(rows), n), np.array(bounds), np.array(owner, dtype=np.intp)
+@dataclass(frozen=True, eq=False)
+class RestLimits:
+    """The limits of a robot at rest, as ``rows q <= bounds``.
+
+    Attributes:
+        rows: (k, n).
+        bounds: (k,).
+        owner: (k,) limit that each row belongs to.
+    """
+
+    rows: FloatArray
+    bounds: FloatArray
+    owner: IntArray
+
+    @staticmethod
+    def of(limits: LinearLimits) -> "RestLimits":
+        """Those on positions; velocities and accelerations are zero at rest."""
+        rows, bounds, owner = [], [], []
+        for k in np.flatnonzero(limits.derivative == 0):
+            for sign, bound in ((1.0, limits.upper[k]), (-1.0, limits.lower[k])):
+                if np.isfinite(bound):
+                    rows.append(sign * limits.joints[k])
+                    bounds.append(sign * bound)
+                    owner.append(int(k))
+        n = limits.joints.shape[1]
+        return RestLimits(np.array(rows).reshape(len(rows), n), np.array(bounds), np.array(owner, dtype=np.intp))
+
+    def slack(self, chosen: NDArray[np.bool_]) -> float:
+        """Smallest s so that the chosen rows hold with ``bounds + s``; at least -1."""
+        rows, n = self.rows[chosen], self.rows.shape[1]
+        program = linprog(
+            np.append(np.zeros(n), 1.0),
+            A_ub=np.column_stack([rows, -np.ones(len(rows))]),
+            b_ub=self.bounds[chosen],
+            bounds=[(None, None)] * n + [(-1.0, None)],
+        )
+        return float(program.x[-1])
+
+    def conflict(self) -> IntArray:
+        """A smallest set of limits that exclude each other: none of it can be left out."""
+        kept = np.unique(self.owner)
+        for k in list(kept):
+            rest = kept[kept != k]
+            if len(rest) and self.slack(np.isin(self.owner, rest)) > -1e-9:
+                kept = rest
+        return kept
 
 
-def inner_point(limits: LinearLimits) -> FloatArray:
+def inner_position(limits: LinearLimits) -> FloatArray:
     """The position at rest that is furthest inside, relative to the range of each limit.
 
     Args:
@@ -42,104 +81,184 @@ def inner_point(limits: LinearLimits) -> FloatArray:
     Raises:
         InfeasibleError: the limits exclude each other; names a smallest set of them and the slack that it needs.
     """
-    rows, bounds, owner = _one_sided(limits)
+    rest = RestLimits.of(limits)
     n = limits.joints.shape[1]
-    width = limits.width[owner]
+    if not len(rest.rows):
+        return np.zeros(n)
     # maximise s with rows q + s width <= bounds, s <= 1/2
     program = linprog(
         np.append(np.zeros(n), -1.0),
-        A_ub=np.column_stack([rows, width]) if len(rows) else None,
-        b_ub=bounds if len(rows) else None,
+        A_ub=np.column_stack([rest.rows, limits.width[rest.owner]]),
+        b_ub=rest.bounds,
         bounds=[(None, None)] * n + [(None, 0.5)],
     )
     if program.status != 0 or program.x[-1] <= 1e-9:
-        raise InfeasibleError(_conflict(limits, rows, bounds, owner))
-    point: FloatArray = np.asarray(program.x[:n], dtype=np.float64)
-    return point
-
-
-def _slack(rows: FloatArray, bounds: FloatArray) -> float:
-    """Smallest s so that rows q <= bounds + s has a solution."""
-    n = rows.shape[1]
-    program = linprog(
-        np.append(np.zeros(n), 1.0),
-        A_ub=np.column_stack([rows, -np.ones(len(rows))]),
-        b_ub=bounds,
-        bounds=[(None, None)] * n + [(-1.0, None)],
+        kept = rest.conflict()
+        slack = max(rest.slack(np.isin(rest.owner, kept)), 0.0)
+        described = ", ".join(
+            f"{limits.names[k]} in [{limits.lower[k]:.6g}, {limits.upper[k]:.6g}] {limits.units[k]}" for k in kept
+        )
+        raise InfeasibleError(
+            f"no trajectory satisfies these limits together: {described}. Widen each by more than {slack:.4g} "
+            f"{limits.units[int(kept[0])]}, or leave one out"
+        )
+    # centred in what is left free, with the same reserve everywhere
+    middle = linprog(
+        np.append(np.zeros(n), -np.ones(len(rest.rows))),
+        A_ub=np.column_stack([rest.rows, np.diag(limits.width[rest.owner])]),
+        b_ub=rest.bounds,
+        bounds=[(None, None)] * n + [(0.999 * program.x[-1], 0.5)] * len(rest.rows),
     )
-    return float(program.x[-1]) if program.status == 0 else -1.0
+    position: FloatArray = np.asarray((middle if middle.status == 0 else program).x[:n], dtype=np.float64)
+    return position
 
 
-def _conflict(limits: LinearLimits, rows: FloatArray, bounds: FloatArray, owner: IntArray) -> str:
-    """Which limits exclude each other, by leaving out one after the other."""
-    kept = sorted({int(k) for k in owner})
-    for k in list(kept):
-        rest = [other for other in kept if other != k]
-        take = np.isin(owner, rest)
-        if rest and _slack(rows[take], bounds[take]) > -1e-9:
-            kept = rest
-    take = np.isin(owner, kept)
-    slack = max(_slack(rows[take], bounds[take]), 0.0)
-    unit = limits.units[kept[0]]
-    described = ", ".join(
-        f"{limits.names[k]} in [{limits.lower[k]:.6g}, {limits.upper[k]:.6g}] {limits.units[k]}" for k in kept
-    )
-    return (
-        f"no trajectory satisfies these limits together: {described}. Widen each by more than {slack:.4g} {unit}, "
-        f"or leave one out"
-    )
-
-
-def random_start(problem: Problem, centre: FloatArray, generator: np.random.Generator) -> FloatArray:
-    """A random trajectory inside all limits.
+def comfortable_position(
+    limits: LinearLimits, walls: Sequence[Wall], harmonics: int, names: Sequence[str], generator: np.random.Generator
+) -> FloatArray:
+    """A position at rest inside the linear limits and inside walls that depend on it nonlinearly.
 
     Args:
-        problem: the limits.
-        centre: (n,) position well inside.
+        limits: linear limits.
+        walls: torque and other limits.
+        harmonics: L of the trajectories that the walls take.
+        names: of the walls' limits, in order.
+        generator: of random positions, tried if the middle of the limits is outside.
+
+    Returns:
+        (n,) position.
+
+    Raises:
+        InfeasibleError: no position was found that can be held.
+    """
+    middle = inner_position(limits)
+    rest = RestLimits.of(limits)
+    n = len(middle)
+    reach = limits.joint_width()
+    best, best_room, best_values = middle, -np.inf, np.zeros(0)
+    for trial in range(400):
+        position = middle
+        if trial:
+            wish = middle + 0.5 * reach * generator.uniform(-1.0, 1.0, n)
+            ahead = rest.rows @ (wish - middle)
+            free = rest.bounds - rest.rows @ middle
+            with np.errstate(divide="ignore", invalid="ignore"):
+                factor = np.where(ahead > 0.0, free / ahead, np.inf).min(initial=1.0)
+            position = middle + 0.9 * min(1.0, float(factor)) * (wish - middle)
+        room, values = _room(walls, at_rest(position, harmonics))
+        if room > best_room:
+            best, best_room, best_values = position, room, values
+        if best_room > 0.3 or (trial >= 60 and best_room > 0.05):
+            break
+    if best_room <= 1e-3:
+        tight = np.flatnonzero(best_values <= 1e-3)
+        described = ", ".join(names[int(k)] for k in tight)
+        raise InfeasibleError(
+            f"no position was found at which the robot can stay inside {described}; the best of 400 lacks "
+            f"{max(-100.0 * best_room, 0.0):.3g} % of the range. Widen these limits"
+        )
+    return best
+
+
+def _room(walls: Sequence[Wall], rest: FloatArray) -> tuple[float, FloatArray]:
+    """Smallest distance to a wall as a part of its half range, and that of every limit."""
+    parts = [np.ones(0)]
+    for wall in walls:
+        value = wall.values(rest)[:, :1]
+        half = np.where(np.isfinite(wall.upper - wall.lower), 0.5 * (wall.upper - wall.lower), 1.0)
+        parts.append((np.minimum(value - wall.lower, wall.upper - value) / half)[:, 0])
+    room = np.concatenate(parts)
+    return float(room.min(initial=1.0)), room
+
+
+def at_rest(position: FloatArray, harmonics: int) -> FloatArray:
+    """(n, 2 L + 1) coefficients of a trajectory that stays at a position."""
+    coefficients = np.zeros((len(position), 2 * harmonics + 1))
+    coefficients[:, -1] = position
+    return coefficients
+
+
+def random_start(
+    limits: LinearLimits, base_frequency: float, centre: FloatArray, generator: np.random.Generator
+) -> FloatArray:
+    """A random trajectory inside all linear limits.
+
+    Args:
+        limits: the limits.
+        base_frequency: of the series [Hz].
+        centre: (n, 2 L + 1) a trajectory at rest, well inside.
         generator: of the random numbers.
 
     Returns:
         (n, 2 L + 1) coefficients.
     """
-    n, width = problem.shape
-    harmonics = (width - 1) // 2
-    rest = np.zeros((n, width))
-    rest[:, -1] = centre
-    omega = 2.0 * np.pi * problem.information.base_frequency * np.arange(1, harmonics + 1)
-    reach = _reach(problem.limits, n)
-    wish = generator.normal(size=(n, width))
+    harmonics = (centre.shape[1] - 1) // 2
+    omega = 2.0 * np.pi * base_frequency * np.arange(1, harmonics + 1)
+    reach = limits.joint_width()
+    wish = generator.normal(size=centre.shape)
     wish[:, :-1] *= 0.5 * reach[:, None] * np.tile(np.minimum(omega, omega[-1] / 3.0), 2) / np.sqrt(harmonics)
-    wish[:, -1] = centre + 0.2 * reach * wish[:, -1]
-    return repair(problem, rest, wish)
+    wish[:, -1] = centre[:, -1] + 0.2 * reach * wish[:, -1]
+    return repair(limits, base_frequency, centre, wish)
 
 
-def repair(problem: Problem, rest: FloatArray, wish: FloatArray) -> FloatArray:
-    """The trajectory inside all limits that is nearest to a wish.
+def repair(limits: LinearLimits, base_frequency: float, centre: FloatArray, wish: FloatArray) -> FloatArray:
+    """The trajectory inside all linear limits that is nearest to a wish, by one QP (with cuts at its extrema).
 
     Args:
-        problem: the limits.
-        rest: (n, 2 L + 1) a trajectory well inside.
+        limits: the limits.
+        base_frequency: of the series [Hz].
+        centre: (n, 2 L + 1) a trajectory at rest, well inside.
         wish: (n, 2 L + 1) a trajectory that may be outside.
 
     Returns:
         (n, 2 L + 1) coefficients.
     """
-    harmonics = problem.information.harmonics
-    cuts = grid_cuts(problem, 2 * harmonics + 2)
+    harmonics = (centre.shape[1] - 1) // 2
+    points = 2 * harmonics + 2
+    count = len(limits)
+    period = 1.0 / base_frequency
+    which = np.repeat(np.arange(count), points)
+    time = (np.tile(np.arange(points), count) + np.repeat(np.arange(count) / max(count, 1), points)) * period / points
     # near in velocity, with the mean position counted like the slowest harmonic
-    weight = np.ones(problem.shape)
-    weight[:, -1] = (2.0 * np.pi * problem.information.base_frequency) ** 2
-    hessian = np.diag(weight.ravel())
-    step, _ = constrained_step(cuts, rest, (weight * (wish - rest)).ravel(), hessian)
-    move = step.reshape(rest.shape)
-    return rest + 0.999 * pull_inside(problem, rest, rest + move) * move
+    weight = np.ones(centre.shape)
+    weight[:, -1] = (2.0 * np.pi * base_frequency) ** 2
+    found = wish
+    for _ in range(_CUT_ROUNDS):
+        rows = limits.rows((base_frequency, harmonics), which, time)
+        present = rows @ centre.ravel()
+        step, _ = solve_quadratic(
+            np.diag(weight.ravel()),
+            -(weight * (wish - centre)).ravel(),
+            rows,
+            limits.lower[which] - present,
+            limits.upper[which] - present,
+            accuracy=1e-6,
+        )
+        found = centre + step.reshape(centre.shape)
+        series = FourierSeries.from_coefficients(found, base_frequency)
+        factor = shrink(limits, series, centre[:, -1])
+        if factor > 0.99:
+            break
+        _, _, extreme, when = limits.extremes(series)
+        level = limits.rows((base_frequency, harmonics), extreme, when) @ found.ravel()
+        outside = (level > limits.upper[extreme]) | (level < limits.lower[extreme])
+        which, time = np.concatenate([which, extreme[outside]]), np.concatenate([time, when[outside]])
+    return centre + factor * (found - centre)
 
 
-def _reach(limits: LinearLimits, n: int) -> FloatArray:
-    """(n,) width of the position range of each joint."""
-    reach = np.full(n, 2.0 * np.pi)
-    for k in range(len(limits)):
-        if limits.derivative[k] == 0 and np.count_nonzero(limits.joints[k]) == 1:
-            i = int(np.argmax(limits.joints[k] != 0.0))
-            reach[i] = min(reach[i], float(limits.width[k]))
-    return reach
+def shrink(limits: LinearLimits, series: FourierSeries, centre: FloatArray) -> float:
+    """Largest factor, at most 1, by which a trajectory keeps all limits when shrunk toward a position at rest.
+
+    Shrinking moves every extreme value in a straight line toward its value at rest, so that the factor is exact.
+
+    Args:
+        limits: the limits.
+        series: the trajectory.
+        centre: (n,) position inside.
+    """
+    low, high, _, _ = limits.extremes(series)
+    rest = np.where(limits.derivative == 0, limits.joints @ centre, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        upward = np.where(high > limits.upper, (limits.upper - rest) / (high - rest), 1.0)
+        downward = np.where(low < limits.lower, (limits.lower - rest) / (low - rest), 1.0)
+    return float(min(1.0, upward.min(initial=1.0), downward.min(initial=1.0)))

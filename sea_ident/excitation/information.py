@@ -1,13 +1,16 @@
 """The information matrix of a Fourier series and its derivatives with respect to the coefficients."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.excitation.columns import ModelColumns
 from sea_ident.motion import FourierSeries, Motion, fourier_basis
 
+SingleArray: TypeAlias = NDArray[np.float32]
 # Numbers held at once while derivatives are contracted (float32).
 _CHUNK = 6_000_000
 
@@ -59,6 +62,10 @@ class Information:
         flat = phi.reshape(-1, phi.shape[2])
         return LocalModel(self, phi, slopes, flat.T @ flat + self.collected)
 
+    def eigenvalues(self, coefficients: FloatArray) -> FloatArray:
+        """(p,) eigenvalues of the information matrix, ascending."""
+        return np.asarray(np.linalg.eigvalsh(self.matrix(coefficients)), dtype=np.float64)
+
     def bases(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(N, 2 L + 1) bases of position, velocity and acceleration."""
         first, second, third = (
@@ -100,7 +107,7 @@ class LocalModel:
         gradient: FloatArray = (parts[0] + parts[1] + parts[2]).T.reshape(-1)
         return gradient
 
-    def changes(self, vectors: FloatArray) -> FloatArray:
+    def changes(self, vectors: FloatArray) -> SingleArray:
         """Change of the information matrix with every coefficient, in another basis.
 
         Args:
@@ -126,5 +133,6 @@ class LocalModel:
             for k in range(3):
                 total += bases[k][part].T @ crossed[:, k]
         half = total.reshape(width, n, p, p).transpose(1, 0, 2, 3).reshape(n * width, p, p)
-        half = vectors.T.astype(np.float32) @ half
-        return half + np.swapaxes(half, 1, 2)
+        half = np.matmul(vectors.T.astype(np.float32), half)
+        changes: SingleArray = half + np.swapaxes(half, 1, 2)
+        return changes

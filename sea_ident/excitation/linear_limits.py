@@ -6,14 +6,17 @@ samples.
 """
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import ExcitationError
 from sea_ident.motion import FourierSeries, fourier_basis
 from sea_ident.robot import Limits, Robot
 
+ComplexArray: TypeAlias = NDArray[np.complex128]
 _KINDS = ("position", "velocity", "acceleration", "jerk")
 
 
@@ -32,7 +35,7 @@ class LinearLimits:
 
     names: tuple[str, ...]
     joints: FloatArray
-    derivative: FloatArray
+    derivative: IntArray
     lower: FloatArray
     upper: FloatArray
     units: tuple[str, ...]
@@ -48,21 +51,16 @@ class LinearLimits:
         with np.errstate(invalid="ignore"):
             return np.where(both, self.upper - self.lower, open_side)
 
-    def tightened(self, fraction: float) -> "LinearLimits":
-        """The limits with a part of their range taken off at both sides."""
-        inset = fraction * self.width
-        return LinearLimits(
-            self.names, self.joints, self.derivative, self.lower + inset, self.upper - inset, self.units
-        )
+    def joint_width(self) -> FloatArray:
+        """(n,) width of the position range of each joint, at most 2 pi (or 2 pi m)."""
+        reach = np.full(self.joints.shape[1], 2.0 * np.pi)
+        for k in np.flatnonzero(self.derivative == 0):
+            joints = np.flatnonzero(self.joints[k])
+            if len(joints) == 1:
+                reach[joints] = np.minimum(reach[joints], self.width[k] / abs(self.joints[k, joints]))
+        return reach
 
-    def take(self, index: FloatArray) -> "LinearLimits":
-        """Some of the limits."""
-        names, units = (tuple(values[int(k)] for k in index) for values in (self.names, self.units))
-        return LinearLimits(
-            names, self.joints[index], self.derivative[index], self.lower[index], self.upper[index], units
-        )
-
-    def rows(self, series_shape: tuple[float, int], which: FloatArray, time: FloatArray) -> FloatArray:
+    def rows(self, series_shape: tuple[float, int], which: IntArray, time: FloatArray) -> FloatArray:
         """(R, n (2 L + 1)) rows so that ``row @ coefficients.ravel()`` is limit `which` at `time`.
 
         Args:
@@ -77,7 +75,7 @@ class LinearLimits:
             basis[take] = fourier_basis(time[take], frequency, harmonics, int(order))
         return (self.joints[which][:, :, None] * basis[:, None, :]).reshape(len(time), -1)
 
-    def extremes(self, series: FourierSeries) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def extremes(self, series: FourierSeries) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
         """Exact extremes over all t.
 
         Args:
@@ -99,8 +97,8 @@ class LinearLimits:
 
 
 def stationary_points(
-    series: FourierSeries, derivative: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    series: FourierSeries, derivative: IntArray
+) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
     """All extrema of trigonometric polynomials.
 
     The slope sum_l A_l cos l phi + B_l sin l phi, times z^L with z = exp(i phi), is a polynomial of degree 2 L in z:
@@ -155,7 +153,7 @@ def stationary_points(
     return low + offset, high + offset, which, time
 
 
-def _unit_roots(polynomial: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _unit_roots(polynomial: ComplexArray) -> tuple[IntArray, FloatArray]:
     """Roots near the unit circle of (m, d + 1) polynomials, lowest power first: index and angle of each."""
     m, size = polynomial.shape
     degree = size - 1

@@ -1,0 +1,217 @@
+"""Ascent of a criterion inside walls, by an interior-point method for each quadratic model.
+
+The criterion is replaced by its gradient and a Gauss-Newton curvature. A few primal-dual steps maximise that model
+inside all limits at once, each taken on a dense grid of times (linear limits cost next to nothing there); then the true
+criterion decides how far to go. What a limit does between the grid points is taken off it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from sea_ident._typing import FloatArray
+from sea_ident.excitation.criteria import Criterion
+from sea_ident.excitation.information import Information
+from sea_ident.excitation.walls import Tangent, Wall
+
+_BOUNDARY = 0.95
+_SMALLEST = 1e-8
+_OPEN = 1e6  # stands for a side without limit
+_INNER = 12
+_INSET = 1e-6  # of the room between rest and limit: kept free
+
+
+@dataclass(eq=False)
+class Side:
+    """One side of a wall: slack = sign * (bound - value) - beyond > 0.
+
+    Attributes:
+        wall: index of the wall.
+        sign: 1 for the upper side, -1 for the lower.
+        bound: (r, 1) bounds.
+        beyond: (r, M) what the value does between the grid points.
+        slack: (r, M) distance.
+        force: (r, M) multipliers.
+    """
+
+    wall: int
+    sign: float
+    bound: FloatArray
+    beyond: FloatArray
+    slack: FloatArray
+    force: FloatArray
+
+
+def model_step(
+    gradient: FloatArray,
+    curvature: FloatArray,
+    tangents: Sequence[Tangent],
+    sides: Sequence[Side],
+    barrier: float,
+    shape: tuple[int, int],
+) -> tuple[FloatArray, list[FloatArray], float]:
+    """Maximise a quadratic model inside linearised walls.
+
+    Args:
+        gradient: (v,).
+        curvature: (v, v), positive definite.
+        tangents: the walls.
+        sides: their slacks and multipliers.
+        barrier: weight of the barrier to begin with.
+        shape: of the coefficients.
+
+    Returns:
+        (v,) step, multipliers after it, and the weight of the barrier reached.
+    """
+    step = np.zeros(len(gradient))
+    slacks = [side.slack for side in sides]
+    forces = [side.force for side in sides]
+    for _ in range(_INNER):
+        pushed = gradient - curvature @ step
+        walled = curvature.copy()
+        for k, tangent in enumerate(tangents):
+            here = [j for j, side in enumerate(sides) if side.wall == k]
+            pushed -= tangent.pull(np.sum([sides[j].sign * barrier / slacks[j] for j in here], axis=0))
+            walled += tangent.curvature(np.sum([forces[j] / slacks[j] for j in here], axis=0))
+        change = scipy.linalg.solve(walled, pushed, assume_a="pos", check_finite=False)
+        moved = [tangent.push(change.reshape(shape)) for tangent in tangents]
+        closings = [side.sign * moved[side.wall] for side in sides]
+        length = min(_fraction(slack, closing) for slack, closing in zip(slacks, closings, strict=True))
+        step = step + length * change
+        for j, closing in enumerate(closings):
+            force = barrier / slacks[j] * (1.0 + closing * forces[j] / barrier)
+            slacks[j] = slacks[j] - length * closing
+            forces[j] = np.clip(force, 0.3 * barrier / slacks[j], 30.0 * barrier / slacks[j])
+        gain = float(gradient @ step - 0.5 * step @ curvature @ step)
+        if length > 0.8:
+            if barrier * len(gradient) < 0.1 * gain or barrier <= _SMALLEST:
+                break
+            barrier = max(_SMALLEST, 0.2 * barrier)
+    return step, forces, barrier
+
+
+def raise_inside(
+    information: Information,
+    criterion: Criterion,
+    walls: Sequence[Wall],
+    centre: FloatArray,
+    coefficients: FloatArray,
+    *,
+    iterations: int = 80,
+    barrier: float = 1e-2,
+    tolerance: float = 1e-3,
+    report: Callable[[float, FloatArray], bool] | None = None,
+) -> FloatArray:
+    """Raise a criterion inside walls.
+
+    Args:
+        information: the information matrix.
+        criterion: function of it.
+        walls: limits on grids of times.
+        centre: (n, 2 L + 1) a trajectory at rest, well inside.
+        coefficients: (n, 2 L + 1) start, inside.
+        iterations: at most so many steps.
+        barrier: weight of the logarithm of the slacks at the start.
+        tolerance: gain of a step that is too small to go on for.
+        report: called with value and coefficients after every step; True stops.
+
+    Returns:
+        (n, 2 L + 1) coefficients, inside; the criterion is never below that of the start.
+    """
+    placed = place_inside(walls, centre, coefficients)
+    if placed is None:
+        return coefficients
+    point, sides = placed
+    value = criterion.value(information.eigenvalues(point))
+    forces = [barrier / side.slack for side in sides]
+    damping, small = 1e-3, 0
+    for _ in range(iterations):
+        gradient, curvature = quadratic_model(information, criterion, point)
+        tangents = [wall.tangent(point) for wall in walls]
+        diagonal = np.diag(curvature).copy()
+        found = -np.inf
+        while found <= value:
+            damped = curvature + np.diag(damping * diagonal + 1e-9 * diagonal.max())
+            for side, force in zip(sides, forces, strict=True):
+                side.force = np.clip(force, 0.3 * barrier / side.slack, 30.0 * barrier / side.slack)
+            step, stepped, reached = model_step(gradient, damped, tangents, sides, barrier, point.shape)
+            predicted = float(gradient @ step - 0.5 * step @ damped @ step)
+            for halvings in range(4):
+                placed = place_inside(walls, centre, point + 0.4**halvings * step.reshape(point.shape))
+                if placed is not None:
+                    found = criterion.value(information.eigenvalues(placed[0]))
+                    if found > value:
+                        break
+            if found <= value:
+                if predicted < tolerance or damping > 1e4:
+                    return point
+                damping *= 10.0
+        assert placed is not None
+        gain, value = found - value, found
+        point, sides = placed
+        forces, barrier = stepped, reached
+        damping = max(1e-6, damping * (0.3, 1.0, 4.0, 10.0)[halvings])
+        if report is not None and report(value, point):
+            break
+        small = small + 1 if gain < tolerance else 0
+        if small >= 2:
+            break
+    return point
+
+
+def quadratic_model(information: Information, criterion: Criterion, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(v,) exact gradient and (v, v) Gauss-Newton curvature of a criterion at (n, 2 L + 1) coefficients."""
+    local = information.model(point)
+    eigenvalues, vectors = np.linalg.eigh(local.matrix)
+    slope, weights = criterion.slope(eigenvalues)
+    gradient = local.gradient((vectors * slope) @ vectors.T)
+    changes = local.changes(vectors)
+    scaled = (changes * np.sqrt(np.maximum(weights, 0.0)).astype(np.float32)).reshape(len(changes), -1)
+    return gradient, (scaled @ scaled.T).astype(np.float64)
+
+
+def place_inside(
+    walls: Sequence[Wall], centre: FloatArray, coefficients: FloatArray
+) -> tuple[FloatArray, list[Side]] | None:
+    """Shrink a trajectory toward rest until it is inside between the grid points too.
+
+    Args:
+        walls: the limits.
+        centre: (n, 2 L + 1) a trajectory at rest, inside.
+        coefficients: (n, 2 L + 1) trajectory.
+
+    Returns:
+        The trajectory and its slacks, or None where it would have to shrink by more than half.
+    """
+    middle = [wall.values(centre) for wall in walls]
+    factor = 1.0
+    for _ in range(4):
+        trial = centre + factor * (coefficients - centre)
+        sides: list[Side] = []
+        worst = 1.0
+        for k, wall in enumerate(walls):
+            value = wall.values(trial)
+            below, above = wall.overshoot(value)
+            for sign, bound, beyond in ((1.0, wall.upper, above), (-1.0, wall.lower, below)):
+                finite = np.where(np.isfinite(bound), bound, sign * _OPEN)
+                slack = sign * (finite - value) - beyond
+                room = sign * (finite - middle[k])
+                tight = slack < _INSET * room
+                if np.any(tight):
+                    room = np.broadcast_to(room, slack.shape)[tight]
+                    worst = min(worst, float((room / (room - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
+                sides.append(Side(k, sign, finite, beyond, slack, slack))
+        if worst >= 1.0:
+            return trial, sides
+        factor *= worst
+        if factor < 0.5:
+            return None
+    return None
+
+
+def _fraction(slack: FloatArray, closing: FloatArray) -> float:
+    """Largest part of a step that uses up no more than nearly all of any slack."""
+    worst = float((closing / slack).max(initial=0.0))
+    return 1.0 if worst <= _BOUNDARY else _BOUNDARY / worst

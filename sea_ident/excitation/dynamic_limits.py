@@ -1,0 +1,177 @@
+"""Limits on motor torque and spring deflection: nonlinear in the motion, through the robot's prior parameters."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sea_ident._typing import FloatArray, IntArray
+from sea_ident.effects import JointEffect
+from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.effects.link_friction import LinkFriction
+from sea_ident.effects.viscous_friction import ViscousFriction
+from sea_ident.exceptions import ExcitationError
+from sea_ident.excitation.bodies import BodyColumns
+from sea_ident.excitation.columns import local_slopes
+from sea_ident.motion import Motion
+from sea_ident.robot import Limits, Robot
+
+
+@dataclass(frozen=True, eq=False)
+class _Friction:
+    """A friction with known values at one joint."""
+
+    effect: JointEffect
+    joint: int
+    link: bool
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicLimits:
+    """|torque| <= bound for the motors and the springs of a robot that follows q (theta = q).
+
+    A deflection limit is a limit on the torque of the spring that bends it so far: K1 d + K3 d^3 rises with d.
+
+    Attributes:
+        robot: the robot, with its prior parameters.
+        names: (r,) names of the limits.
+        rows: (r,) joint of each.
+        springs: (r,) whether it is about the spring (link row) or the motor (sum of link and motor row).
+        bound: (r,) largest torque [N m].
+        units: (r,) units.
+        friction: friction with known values.
+    """
+
+    robot: Robot
+    names: tuple[str, ...]
+    rows: IntArray
+    springs: FloatArray
+    bound: FloatArray
+    units: tuple[str, ...]
+    friction: tuple[_Friction, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def _bodies(self) -> BodyColumns:
+        return BodyColumns.torque(self.robot.extended_model)
+
+    @cached_property
+    def _fold(self) -> FloatArray:
+        """(nv, r) from coordinates to limits."""
+        robot = self.robot
+        both = robot.link_map + robot.motor_map
+        return np.where(self.springs[None, :], robot.link_map[:, self.rows], both[:, self.rows])
+
+    def evaluate(self, motion: Motion, *, derivatives: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Torques of a motion.
+
+        Args:
+            motion: (N, n) motion; theta = q.
+            derivatives: whether to compute them.
+
+        Returns:
+            (N, r) torques and (N, r, 3 n) derivatives by q, q' and q'' (empty if not asked for).
+        """
+        robot, n = self.robot, self.robot.n
+        both = robot.link_map + robot.motor_map
+        column, slope = self._bodies.evaluate(
+            motion.q @ both.T + robot.offset, motion.dq @ both.T, motion.ddq @ both.T, derivatives=derivatives
+        )
+        torque = column[:, :, 0] @ self._fold
+        slopes = np.zeros((len(motion), len(self), 3 * n if derivatives else 0))
+        if derivatives:
+            nv = both.shape[0]
+            folded = np.swapaxes(slope[:, :, 0], 1, 2) @ self._fold  # (N, 3 nv, r)
+            for k in range(3):
+                slopes[:, :, k * n : (k + 1) * n] = np.swapaxes(both.T @ folded[:, k * nv : (k + 1) * nv], 1, 2)
+        for friction in self.friction:
+            i = friction.joint
+            places = np.flatnonzero((self.rows == i) & (friction.link | ~self.springs.astype(bool)))
+            if not len(places):
+                continue
+            state = (motion.q[:, i], motion.dq[:, i], motion.q[:, i], motion.dq[:, i])
+            torque[:, places] += (friction.effect.local_columns(*state) @ friction.values)[:, None]
+            if derivatives:
+                for part, block in zip(local_slopes(friction.effect, *state), (0, 1, 0, 1), strict=True):
+                    if part is not None:
+                        slopes[:, places, block * n + i] += (part @ friction.values)[:, None]
+        return torque, slopes
+
+
+def dynamic_limits(robot: Robot, limits: Limits, notes: list[str]) -> DynamicLimits:
+    """The torque and deflection limits of a robot.
+
+    Args:
+        robot: the robot; torques are those of its prior inertial parameters, rotors and friction.
+        limits: its limits.
+        notes: what is left out is added here.
+
+    Returns:
+        Those that limit anything.
+
+    Raises:
+        ExcitationError: a bound that is NaN or not positive, or a deflection limit at a joint without stiffness.
+    """
+    names, rows, springs, bounds, units = [], [], [], [], []
+    for i, joint in enumerate(robot.joints):
+        for kind, values in (("torque", limits.torque), ("deflection", limits.deflection)):
+            value = float(values[i])
+            if np.isnan(value) or value <= 0.0:
+                raise ExcitationError(f"limit {joint.name}.{kind}: is {value}; give a positive number or infinity")
+            if np.isposinf(value):
+                continue
+            if kind == "deflection":
+                spring = robot.spring(joint.name) if joint.elastic else None
+                if spring is None:
+                    raise ExcitationError(f"limit {joint.name}.deflection: the joint is rigid; remove the limit")
+                if spring.stiffness is None:
+                    notes.append(
+                        f"the deflection limit of {joint.name!r} is left out: no prior stiffness predicts what bends it"
+                    )
+                    continue
+                value = spring.stiffness * value + (spring.cubic_stiffness or 0.0) * value**3
+            names.append(f"{joint.name}.{'spring_torque' if kind == 'deflection' else 'torque'}")
+            rows.append(i)
+            springs.append(kind == "deflection")
+            bounds.append(value)
+            units.append(joint.torque_unit)
+    if rows:
+        _note_unknown(robot, sorted(set(rows)), notes)
+    return DynamicLimits(
+        robot,
+        tuple(names),
+        np.array(rows, dtype=np.intp),
+        np.array(springs, dtype=bool),
+        np.array(bounds),
+        tuple(units),
+        _known_friction(robot),
+    )
+
+
+def _known_friction(robot: Robot) -> tuple[_Friction, ...]:
+    found = []
+    for kind, link in ((ViscousFriction, False), (CoulombFriction, False), (LinkFriction, True)):
+        for effect in kind.instances(robot):
+            assert isinstance(effect, JointEffect)
+            values = np.nan_to_num(effect.prior(robot))
+            if np.any(values):
+                found.append(_Friction(effect, robot.index(effect.required_joint), link, values))
+    return tuple(found)
+
+
+def _note_unknown(robot: Robot, rows: list[int], notes: list[str]) -> None:
+    """Say which friction the predicted torque leaves out."""
+    missing = [
+        robot.joints[i].name
+        for i in rows
+        if np.isnan(ViscousFriction(joint=robot.joints[i].name).prior(robot)[0])
+        and np.isnan(CoulombFriction(joint=robot.joints[i].name).prior(robot)[0])
+    ]
+    if missing:
+        notes.append(
+            f"torques are predicted without friction at {', '.join(missing)}: the description gives none; lower the "
+            f"torque limits by what friction may take"
+        )
