@@ -26,13 +26,19 @@ class _Rendered:
     body: Markup
 
 
+LONGEST_WHOLE = 6
+"""Digits up to which a number is written without a power of ten."""
+
+
 def number(value: float | None, digits: int = 4) -> str:
     """A number for people: so many digits, a true minus sign, a dash where there is none."""
     if value is None or not math.isfinite(value):
         return "\N{EN DASH}"
     text = f"{value:.{digits}g}"
     mantissa, e, power = text.partition("e")
-    if e:
+    if e and 0 < int(power) < LONGEST_WHOLE:
+        text = f"{float(text):.0f}"
+    elif e:
         text = f"{mantissa}\N{MULTIPLICATION SIGN}10{_superscript(int(power))}"
     return text.replace("-", "\N{MINUS SIGN}")
 

@@ -10,6 +10,9 @@ from sea_ident.report.content import Content
 from sea_ident.report.section import Section
 from sea_ident.report.sections.parameters import POOR_PERCENT, parameter_rows
 
+NAMED = 8
+"""Parameters that one sentence names."""
+
 NEAR_NOISE = 1.5
 """A residual within this many times its noise is called explained."""
 
@@ -76,7 +79,10 @@ def _parameters(content: Content) -> list[Finding]:
     known = [row for row in rows if row.stated is not None]
     found = []
     if poor:
-        names = ", ".join(f"{row.name} ({row.relative:.0f} %)" for row in poor)
+        worst = sorted(poor, key=lambda row: -row.relative)
+        names = ", ".join(f"{row.name} ({row.relative:.0f} %)" for row in worst[:NAMED])
+        if len(worst) > NAMED:
+            names += f" and {len(worst) - NAMED} more"
         found.append(
             Finding(
                 "warn",
@@ -90,8 +96,8 @@ def _parameters(content: Content) -> list[Finding]:
             Finding("good", "Parameters", f"all {len(rows)} are known to better than {POOR_PERCENT:.0f} % (one std).")
         )
     if known and off:
-        worst = sorted(off, key=lambda row: -abs(row.value - (row.stated or 0.0)) / max(row.std, 1e-300))[:4]
-        names = ", ".join(f"{row.name} ({row.value:.4g} instead of {row.stated:.4g} {row.unit})" for row in worst)
+        furthest = sorted(off, key=lambda row: -abs(row.value - (row.stated or 0.0)) / max(row.std, 1e-300))[:4]
+        names = ", ".join(f"{row.name} ({row.value:.4g} instead of {row.stated:.4g} {row.unit})" for row in furthest)
         found.append(
             Finding(
                 "",
