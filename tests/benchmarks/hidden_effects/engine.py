@@ -136,7 +136,9 @@ def simulate_mujoco(
     if any(d and not e for d, e in zip(driven, elastic, strict=True)):
         raise NotImplementedError("rigid joints with rotors are not simulated")
     iq = [dof(name) for name in robot.joint_names]
-    it = [dof(f"{name} rotor") if e else iq[i] for i, (name, e) in enumerate(zip(robot.joint_names, elastic, strict=True))]
+    it = [
+        dof(f"{name} rotor") if e else iq[i] for i, (name, e) in enumerate(zip(robot.joint_names, elastic, strict=True))
+    ]
     soft = [
         (dof(f"{p.joint} flexibility"), robot.index(str(p.joint)), p.size)
         for p in planted
@@ -315,7 +317,9 @@ def _structure(
             payloads.append(Payload(str(p.joint), p.size, (p.shape["x"], p.shape["y"], p.shape["z"])))
         elif p.effect == "link_flexibility":
             stiffness = 1.0 / max(p.size, 1e-12)
-            flexibilities.append(Flexibility(str(p.joint), stiffness, p.shape["damping"] * stiffness, p.shape["inertia"]))
+            flexibilities.append(
+                Flexibility(str(p.joint), stiffness, p.shape["damping"] * stiffness, p.shape["inertia"])
+            )
         elif p.effect == "transmission_coupling":
             couplings.append(Coupling(str(p.joint), names[int(p.shape["other"])], p.size))
     return tuple(payloads), tuple(flexibilities), tuple(couplings)

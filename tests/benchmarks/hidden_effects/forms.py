@@ -65,9 +65,7 @@ def trend(kind: float, duration: float) -> Callable[[float], float]:
     return lambda t: (1.0 - exp(-3.0 * max(t, 0.0) / duration)) / (1.0 - exp(-3.0))
 
 
-def bind(
-    planted: Planted, truth: Truth, hooks: list[Hooks], wide: list[Wide], step: float, duration: float
-) -> None:
+def bind(planted: Planted, truth: Truth, hooks: list[Hooks], wide: list[Wide], step: float, duration: float) -> None:
     """Add a planted effect to the hooks of a simulation.
 
     Args:

@@ -89,12 +89,12 @@ class Gauge:
         self.friction = replace(friction, jitter=0.0)
         self.exact = self._simulate(())
         self.clean = signals(self.exact, truth, ())
-        self.floors = {exact: self._residual(self.clean, self.exact.motion if exact else None) for exact in (True, False)}
+        self.floors = {
+            exact: self._residual(self.clean, self.exact.motion if exact else None) for exact in (True, False)
+        }
 
     def _simulate(self, planted: tuple[Planted, ...]) -> Exact:
-        return simulate_mujoco(
-            self.truth, self.series, 1, planted=planted, friction=self.friction, settle=self.settle
-        )
+        return simulate_mujoco(self.truth, self.series, 1, planted=planted, friction=self.friction, settle=self.settle)
 
     def _residual(self, clean: dict[str, FloatArray], motion: Motion | None) -> FloatArray:
         return np.stack(base_residual(self.truth.robot, clean, motion, self.series.period, self.friction.smoothing))

@@ -155,9 +155,7 @@ def record_project(
     """
     noise, robot = case.noise, truth.robot
     plant = plant_of(truth)
-    effects = [
-        e for p in planted for e in planted_effects(p, truth, case.friction_smoothing, case.period, periods)
-    ]
+    effects = [e for p in planted for e in planted_effects(p, truth, case.friction_smoothing, case.period, periods)]
     share = noise.torque * _torque_rms(truth, series)
     scale = np.array([j.actuator.gear_ratio if j.actuator else 1.0 for j in robot.joints]) * np.nan_to_num(
         plant.torque_constant, nan=1.0

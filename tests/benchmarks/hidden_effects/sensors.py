@@ -1,4 +1,4 @@
-"""What the sensors make of the exact motion: effects in the signal chain, noise, quantisation, the recording's columns."""
+"""What the sensors make of the exact motion: effects in the signal chain, noise, quantisation, columns."""
 
 import numpy as np
 

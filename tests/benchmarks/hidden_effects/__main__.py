@@ -1,0 +1,41 @@
+"""`python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR [--row ROW] [--jobs 2]`, `table DIR`."""
+
+import argparse
+from pathlib import Path
+
+from tests.benchmarks.hidden_effects.draw import ROWS
+from tests.benchmarks.hidden_effects.runner import Task, run
+from tests.benchmarks.hidden_effects.table import write_report
+
+
+def main() -> None:
+    """Run cases or print the table of a run."""
+    parser = argparse.ArgumentParser(prog="hidden_effects", description=__doc__)
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    runs = verbs.add_parser("run", help="draw, simulate and diagnose cases; goes on where it was stopped")
+    runs.add_argument("--cases", type=int, default=10, help="cases per row")
+    runs.add_argument("--first", type=int, default=0, help="number of the first case")
+    runs.add_argument("--seed", type=int, required=True)
+    runs.add_argument("--out", type=Path, required=True)
+    runs.add_argument("--row", action="append", choices=list(ROWS), help="may be given more than once; default all")
+    runs.add_argument("--jobs", type=int, default=2)
+    runs.add_argument("--keep", action="store_true", help="keep the recordings of diagnosed cases")
+    runs.add_argument("--generate-only", action="store_true", help="do not diagnose")
+    shown = verbs.add_parser("table", help="print the table of a run")
+    shown.add_argument("out", type=Path)
+    arguments = parser.parse_args()
+    if arguments.verb == "run":
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        rows = arguments.row or list(ROWS)
+        numbers = range(arguments.first, arguments.first + arguments.cases)
+        tasks = [
+            Task(arguments.out, arguments.seed, row, index, arguments.keep, arguments.generate_only)
+            for index in numbers
+            for row in rows
+        ]
+        run(tasks, arguments.jobs)
+    print(write_report(arguments.out))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+"""The generators of the hidden-effect benchmark: an independent engine obeys the equations of the library."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", reason="the independent engine of the benchmark is MuJoCo")
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from sea_ident.base_parameters import find_base_parameters
+from sea_ident.effects import Effect, base_effects, make_effect, spring_effects
+from sea_ident.regressor import build_regressor
+from tests.benchmarks.hidden_effects import catalogue, gap, sensors
+from tests.benchmarks.hidden_effects.case import Case, Planted, generator
+from tests.benchmarks.hidden_effects.draw import draw_case
+from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
+from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
+from tests.benchmarks.hidden_effects.table import wilson
+from tests.benchmarks.hidden_effects.trajectories import draw_trajectory
+
+SMOOTHING = 0.02
+
+
+def truth_and_run(name: str, planted: tuple[Planted, ...] = ()) -> tuple[Truth, Exact]:
+    rng = generator(5, 6)
+    truth = drawn_truth(name, rng)
+    series = draw_trajectory(name, 4.0, rng, candidates=4)
+    friction = Friction("tanh", SMOOTHING)
+    return truth, simulate_mujoco(truth, series, 1, planted=planted, friction=friction, step=5e-4)
+
+
+def sum_model(truth: Truth) -> tuple[Effect, ...]:
+    return tuple(
+        make_effect(e.name, e.joint, smoothing=SMOOTHING) if e.name == "coulomb_friction" else e
+        for e in base_effects(truth.robot)
+    )
+
+
+def true_parameters(truth: Truth, effects: tuple[Effect, ...]) -> np.ndarray:
+    robot, values = truth.robot, []
+    for effect in effects:
+        i = 0 if effect.joint is None else robot.index(effect.joint)
+        numbers = {
+            "viscous_friction": truth.viscous,
+            "coulomb_friction": truth.coulomb,
+            "spring_stiffness": truth.stiffness,
+            "spring_stiffening": truth.cubic,
+            "spring_damping": truth.damping,
+        }
+        values.append(numbers[effect.name][i : i + 1] if effect.name in numbers else effect.prior(robot))
+    return np.concatenate(values)
+
+
+@pytest.mark.parametrize("name", ["exo_leg", "baxter"])
+def test_mujoco_plant_obeys_link_and_motor_rows(name: str) -> None:
+    """Rotors are bodies of MuJoCo's, so the coupling terms of the library are checked by another engine."""
+    truth, exact = truth_and_run(name)
+    effects = (*sum_model(truth), *spring_effects(truth.robot))
+    regressor = build_regressor(truth.robot, effects, exact.motion)
+    parameters = true_parameters(truth, effects)
+    torque = np.sqrt(np.mean(exact.tau_motor**2, axis=0))
+    calm = np.abs(exact.motion.dtheta) > 5 * SMOOTHING  # well outside the smoothing of the friction
+    assert calm.sum(axis=0).min() > 100
+    link = np.abs(regressor.link @ parameters) / torque
+    motor = np.abs(regressor.motor @ parameters - exact.tau_motor) / torque
+    for i in range(truth.robot.n):
+        assert np.quantile(link[calm[:, i], i], 0.95) < 2e-4
+        assert np.quantile(motor[calm[:, i], i], 0.95) < 2e-4
+
+
+@pytest.mark.parametrize("name", ["exo_leg", "ur5"])
+def test_regression_on_mujoco_states_recovers_base_parameters(name: str) -> None:
+    truth, exact = truth_and_run(name)
+    effects = sum_model(truth)
+    base = find_base_parameters(truth.robot, effects)
+    rows = build_regressor(truth.robot, effects, exact.motion).sum[:, :, base.independent]
+    matrix = rows.reshape(-1, base.rank)
+    norms = np.linalg.norm(matrix, axis=0)
+    estimate = np.linalg.lstsq(matrix / norms, exact.tau_motor.ravel(), rcond=None)[0] / norms
+    expected = base.project(true_parameters(truth, effects))
+    contribution = norms / np.linalg.norm(exact.tau_motor)
+    assert np.all(np.abs(estimate - expected) * contribution < 3e-3)
+    friction = [k for k, name in enumerate(base.names) if "friction" in name]
+    np.testing.assert_allclose(estimate[friction], expected[friction], rtol=0.05)
+
+
+def test_without_its_rotor_coupling_the_plant_is_another_one() -> None:
+    """The check above can fail: the rotors of the elastic arm matter in the link rows."""
+    truth, exact = truth_and_run("baxter")
+    effects = (*sum_model(truth), *spring_effects(truth.robot))
+    parameters = true_parameters(truth, effects)
+    columns = build_regressor(truth.robot, effects, exact.motion)
+    rotors = ["rotor_inertia" in name for name in columns.names]
+    torque = np.sqrt(np.mean(exact.tau_motor**2, axis=0))
+    link = np.abs(columns.link @ np.where(rotors, 0.0, parameters)) / torque
+    assert np.median(link, axis=0).max() > 1e-3
+
+
+def test_a_stuck_motor_does_not_creep() -> None:
+    """True stiction: below the Coulomb torque the speed is zero, not small."""
+    rng = generator(1)
+    truth = drawn_truth("exo_leg", rng)
+    series = draw_trajectory("exo_leg", 4.0, rng, weak=True)
+    hold = tuple(
+        Planted("stribeck_friction", name, "library", 80.0, {"speed": 1e3, "exponent": 1.0})
+        for name in truth.robot.joint_names
+    )
+    exact = simulate_mujoco(truth, series, 1, planted=hold, friction=Friction("ramp", 0.0))
+    late = exact.motion.dtheta[len(exact.motion) // 2 :]
+    assert np.abs(late).max() < 1e-6
+    assert np.ptp(exact.tau_motor, axis=0).min() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("effect", "form", "joint"),
+    [
+        ("stribeck_friction", "lorentz", 1),
+        ("spring_hysteresis", "bouc_wen", 1),
+        ("torque_ripple", "two_orders", 0),
+        ("encoder_eccentricity", "library", 0),
+        ("transmission_coupling", "library", 1),
+    ],
+)
+def test_planted_sizes_leave_the_wanted_gap(effect: str, form: str, joint: int) -> None:
+    rng = generator(3)
+    truth = drawn_truth("exo_leg", rng)
+    series = draw_trajectory("exo_leg", 4.0, rng)
+    gauge = gap.Gauge(truth, series, Friction("tanh", 0.01), 1)
+    planted = catalogue.draw_effect(catalogue.ENTRIES[(effect, form)], gauge, joint, 0.03, rng)
+    assert planted is not None
+    assert gauge.measure(planted).gap == pytest.approx(0.03, rel=0.36)
+    assert gauge.measure(replace(planted, size=0.0 * planted.size + 1e-9)).gap < 0.01
+
+
+def test_every_form_has_a_law_and_every_entry_a_place() -> None:
+    rng = generator(4)
+    truth = drawn_truth("exo_leg", rng)
+    series = draw_trajectory("exo_leg", 4.0, rng, candidates=2)
+    gauge = gap.Gauge(truth, series, Friction("tanh", 0.01), 0)
+    for entry in catalogue.ENTRIES.values():
+        joint = catalogue.places(entry, gauge)[0]
+        size, largest, shape = entry.draw(catalogue.Place(gauge, joint, rng))
+        assert 0.0 < abs(size) <= largest
+        name = None if entry.whole else truth.robot.joint_names[joint]
+        planted = Planted(entry.effect, name, entry.form, size, shape)
+        exact = simulate_mujoco(truth, series, 1, planted=(planted,), settle=0, rate=50.0)
+        seen = sensors.signals(exact, truth, (planted,))
+        plain = sensors.signals(gauge.exact, truth, ())
+        assert any(not np.allclose(seen[k], plain[k][::4], rtol=0.0, atol=1e-9) for k in ("q", "theta", "tau_motor"))
+
+
+def test_cases_follow_from_their_seed_and_survive_json() -> None:
+    case = draw_case(11, "none", 2)
+    assert case == draw_case(11, "none", 2)
+    assert case != draw_case(12, "none", 2)
+    assert Case.from_dict(case.to_dict()) == case
+
+
+def test_wilson_interval_matches_the_published_example() -> None:
+    """Newcombe, Statistics in Medicine 17, 1998: 81 of 263 gives 0.2553 to 0.3662."""
+    np.testing.assert_allclose(wilson(81, 263), (0.2553, 0.3662), atol=5e-5)
