@@ -1,6 +1,6 @@
 """Closed-loop forward dynamics of the elastic robot, and what its sensors see."""
 
-from sea_ident.simulation.controller import ComputedTorque, Controller, VelocityController
+from sea_ident.simulation.controller import ComputedTorque, Controller, Drive, VelocityController
 from sea_ident.simulation.friction import FrictionJitter, FrictionLaw, PreslidingCoulomb, SmoothCoulomb
 from sea_ident.simulation.model_plant import ModelPlant, plant_from_model
 from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
@@ -11,6 +11,7 @@ from sea_ident.simulation.simulate import Settling, simulate
 __all__ = [
     "ComputedTorque",
     "Controller",
+    "Drive",
     "FrictionJitter",
     "FrictionLaw",
     "ModelPlant",

@@ -133,7 +133,7 @@ class FrictionJitter:
     """
 
     spread: float = 0.3
-    speed: float = 0.1
+    speed: float = 0.05
 
     def __post_init__(self) -> None:
         if self.spread < 0.0 or not self.speed > 0.0:

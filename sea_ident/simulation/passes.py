@@ -86,7 +86,7 @@ class Passes:
                 try:
                     state = system.step(begin + k * h, biases[k], state)
                 except (SimulationError, OverflowError) as error:
-                    raise SimulationError(f"the simulation diverged at {begin + k * h:.4f} s: {error}") from None
+                    raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
                 k += 1
                 system.accept(begin + k * h, state)
             self._check(state, begin + k * h)
@@ -110,10 +110,13 @@ class Passes:
         k = int(np.argmax(speeds))
         i, side = (k, "link") if k < robot.n else (int(robot.elastic_indices[k - robot.n]), "motor")
         raise SimulationError(
-            f"the simulation diverged at {time:.4f} s: the {side} of joint {robot.joint_names[i]!r} moves at "
+            f"the simulation diverged {self._at(time)}: the {side} of joint {robot.joint_names[i]!r} moves at "
             f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s; take a shorter step than {self._clock.step:g} s, or "
             "softer gains of the controller"
         )
+
+    def _at(self, time: float) -> str:
+        return f"at {time:.4f} s" + (" (while it settled)" if time < self._begin else "")
 
     def motion(self) -> Motion:
         """(N, n) recorded motion."""
@@ -133,5 +136,6 @@ class Passes:
 
     @property
     def tau_spring(self) -> FloatArray:
-        """(N, n) recorded torques of the springs [N m]."""
-        return np.array(self._tau_spring)
+        """(N, n) recorded torques of the springs, 0 at rigid joints [N m]."""
+        torque: FloatArray = np.array(self._tau_spring) * self._system.plant.robot.elastic
+        return torque

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from sea_ident import SeaIdentError
+from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.simulation import plant_from_model, plant_from_robot, simulate
+
+
+def test_model_with_the_values_of_the_description_is_the_description(leg, leg_series, quiet, exact):
+    effects = (*base_effects(leg), *spring_effects(leg))
+    model = plant_from_model(leg, effects, plant_from_robot(leg).values_of(effects))
+    assert model.effects == ()
+    options = {**quiet, "friction": model.friction}
+    run = simulate(leg, leg_series, periods=1, plant=model.plant, effects=model.effects, **options)
+    np.testing.assert_allclose(run.motion.q, exact.motion.q[: len(run.motion)], atol=1e-10)
+    np.testing.assert_allclose(
+        run.recording.columns["current_hip"], exact.recording.columns["current_hip"][: len(run.motion)], atol=1e-9
+    )
+
+
+def test_what_is_no_number_of_a_plant_is_planted(leg):
+    extra = make_effect("torque_offset", "knee")
+    effects = (*base_effects(leg), *spring_effects(leg), extra)
+    values = np.append(plant_from_robot(leg).values_of(effects[:-1]), 0.4)
+    model = plant_from_model(leg, effects, values)
+    assert [p.effect for p in model.effects] == [extra]
+    assert model.effects[0].values.tolist() == [0.4]
+    assert [law.smoothing for law in model.friction] == [0.01] * 3
+
+
+def test_model_without_springs_cannot_move_a_leg(leg):
+    effects = base_effects(leg)
+    with pytest.raises(SeaIdentError, match="'hip': the stiffness of its spring is 0"):
+        plant_from_model(leg, effects, plant_from_robot(leg).values_of(effects))
+
+
+def test_missing_values_are_named(leg):
+    effects = (*base_effects(leg), *spring_effects(leg))
+    values = plant_from_robot(leg).values_of(effects)
+    values[-1] = np.nan
+    with pytest.raises(SeaIdentError, match=r"no value for 'ankle\.spring_damping'"):
+        plant_from_model(leg, effects, values)
+    with pytest.raises(SeaIdentError, match="parameters"):
+        plant_from_model(leg, effects, values[:-1])

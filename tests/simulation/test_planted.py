@@ -1,0 +1,140 @@
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from plants import modest_series, ur10
+
+from sea_ident import SeaIdentError, build_regressor
+from sea_ident.effects import Column, JointEffect, Side, base_effects, make_effect, spring_effects
+from sea_ident.simulation import PlantedEffect, plant_from_robot, simulate
+
+PLANTED = [
+    ("torque_offset", [0.7]),
+    ("stribeck_friction", [0.5]),
+    ("nonlinear_viscous_friction", [0.4]),
+    ("load_dependent_friction", [0.05]),
+    ("directional_efficiency", [0.08]),
+    ("position_dependent_friction", [0.2, 0.1]),
+    ("torque_ripple", [0.2, -0.1]),
+    ("asymmetric_spring", [40.0]),
+    ("spring_offset", [0.5]),
+    ("backlash", [60.0]),
+    ("link_friction", [0.3, 0.4]),
+    ("parallel_spring", [5.0, 0.4]),
+    ("stiffness_drift", [50.0]),
+    ("friction_drift", [0.05, 0.1]),
+]
+
+
+@pytest.mark.parametrize(("name", "values"), PLANTED, ids=[name for name, _ in PLANTED])
+def test_planted_effect_acts_as_its_columns_say(leg, leg_series, quiet, exact, name, values):
+    effect = make_effect(name, "knee")
+    planted = [PlantedEffect(effect, np.array(values))]
+    run = simulate(leg, leg_series, periods=1, effects=planted, start=exact.motion, **quiet)
+    own = (*base_effects(leg), *spring_effects(leg))
+    psi = np.concatenate([plant_from_robot(leg).values_of(own), values])
+    regressor = build_regressor(leg, (*own, effect), run.motion)
+    np.testing.assert_allclose(regressor.motor @ psi, run.tau_motor, atol=1e-10)
+    np.testing.assert_allclose(regressor.link @ psi, 0.0, atol=1e-10)
+    share = (
+        np.abs(regressor.sum[:, :, -len(values) :] @ values).max()
+        + np.abs(regressor.link[:, :, -len(values) :] @ values).max()
+    )
+    assert share > 1e-3
+
+
+def test_spring_effects_are_part_of_the_spring_torque(leg, leg_series, quiet):
+    effect = PlantedEffect(make_effect("spring_offset", "hip"), np.array([2.0]))
+    run = simulate(leg, leg_series, periods=1, effects=[effect], **quiet)
+    d, plant = run.motion.deflection, run.plant
+    law = plant.stiffness * d + plant.cubic_stiffness * d**3 + plant.spring_damping * run.motion.deflection_rate
+    np.testing.assert_allclose(run.tau_spring - law, np.tile([2.0, 0.0, 0.0], (len(d), 1)), atol=1e-10)
+
+
+def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet):
+    robot = ur10()
+    effect = make_effect("load_dependent_friction", "elbow_joint")
+    values = np.array([0.1])
+    run = simulate(robot, modest_series(robot), periods=1, effects=[PlantedEffect(effect, values)], **quiet)
+    own = base_effects(robot)
+    psi = np.concatenate([np.nan_to_num(plant_from_robot(robot).values_of(own)), values])
+    regressor = build_regressor(robot, (*own, effect), run.motion)
+    np.testing.assert_allclose(regressor.sum @ psi, run.tau_motor, atol=1e-9)
+    assert not np.any(run.tau_spring)
+
+
+def test_memory_moves_on_with_accepted_steps_only(leg, leg_series, quiet, exact):
+    effect = make_effect("presliding_friction", "knee", displacement=0.01)
+    planted = [PlantedEffect(effect, np.array([1.0]))]
+    run = simulate(leg, leg_series, periods=1, step=1.25e-3, effects=planted, start=exact.motion, **quiet)
+    speed, lag, path = run.motion.dtheta[:, 1], [0.0], run.motion.theta[:, 1]
+    for k in range(1, len(path)):  # Dahl's law in small steps along the recorded path
+        for _ in range(200):
+            step = (path[k] - path[k - 1]) / 200.0
+            lag.append(lag[-1] + step / 0.01 * (1.0 - lag[-1] * np.sign(step)))
+    expected = np.array(lag)[::200] - np.tanh(speed / 0.01)
+    own = (*base_effects(leg), *spring_effects(leg))
+    acting = run.tau_motor - build_regressor(leg, own, run.motion).motor @ plant_from_robot(leg).values_of(own)
+    # a reversal between two samples is not in the recorded path
+    np.testing.assert_allclose(acting[:, 1], expected, atol=5e-3)
+    assert np.ptp(expected) > 0.5
+
+
+def test_sensor_effects_change_the_recording_and_not_the_robot(leg, leg_series, quiet, exact):
+    effect = PlantedEffect(make_effect("encoder_offset", "knee", offset=0.01), np.zeros(0))
+    run = simulate(leg, leg_series, periods=2, effects=[effect], **quiet)
+    assert np.array_equal(run.motion.q, exact.motion.q)
+    shift = run.recording.channel("q", leg.joint_names) - exact.recording.channel("q", leg.joint_names)
+    np.testing.assert_allclose(np.abs(shift), np.tile([0.0, 0.01, 0.0], (len(shift), 1)), atol=1e-12)
+
+
+def test_payload_is_carried(leg, leg_series, quiet):
+    effect = make_effect("payload", "ankle")
+    values = np.zeros(len(effect.columns(leg)))
+    values[0] = 1.0
+    run = simulate(leg, leg_series, periods=1, effects=[PlantedEffect(effect, values)], **quiet)
+    more = run.plant.robot.inertial_parameters - leg.inertial_parameters
+    assert more[20] == pytest.approx(1.0)
+    own = base_effects(run.plant.robot)
+    regressor = build_regressor(run.plant.robot, own, run.motion)
+    np.testing.assert_allclose(regressor.sum @ run.plant.values_of(own), run.tau_motor, atol=1e-10)
+
+
+@dataclass(frozen=True)
+class Gust(JointEffect):
+    """Somebody's own effect: a torque that depends on time."""
+
+    name: ClassVar[str] = "gust"
+    side: ClassVar[Side] = Side.LINK
+    source: ClassVar[str] = "this test"
+
+    def columns(self, robot):
+        return (Column(self.parameter_name(), "N m", self.name, self.joint, self.side),)
+
+    def local_columns(self, q, dq, theta, dtheta):
+        raise NotImplementedError
+
+    def torque(self, robot, values):
+        i = robot.index(self.joint)
+        seen = []
+
+        def act(state, link, motor):
+            assert state.time >= 0.0
+            seen.append(state.elapsed)
+            link[i] -= float(values[0]) * np.sin(3.0 * state.time)
+
+        return act
+
+
+def test_effects_of_others_see_the_time_of_the_recording(leg, leg_series, quiet):
+    run = simulate(leg, leg_series, periods=1, effects=[PlantedEffect(Gust("hip"), np.array([3.0]))], **quiet)
+    own = (*base_effects(leg), *spring_effects(leg))
+    regressor = build_regressor(leg, own, run.motion)
+    push = (regressor.link @ plant_from_robot(leg).values_of(own))[:, 0]
+    np.testing.assert_allclose(push, 3.0 * np.sin(3.0 * run.motion.time), atol=1e-10)
+
+
+def test_wrong_number_of_values_is_refused(leg, leg_series):
+    with pytest.raises(SeaIdentError, match=r"link_friction.*2 parameters"):
+        simulate(leg, leg_series, effects=[PlantedEffect(make_effect("link_friction", "hip"), np.zeros(1))])

@@ -1,0 +1,181 @@
+import numpy as np
+import pytest
+from plants import Wave, from_parts, joint, link, modest_series, motor, ur10
+
+from sea_ident import FourierSeries, Motion, SeaIdentError, load_robot
+from sea_ident.simulation import (
+    ComputedTorque,
+    FrictionJitter,
+    SensorNoise,
+    Settling,
+    SmoothCoulomb,
+    VelocityController,
+    plant_from_robot,
+    simulate,
+)
+
+
+def test_settled_motion_repeats(exact):
+    samples = len(exact.motion) // 2
+    first, second = exact.motion[:samples], exact.motion[samples:]
+    assert exact.settled < 1e-8
+    for name in ("q", "theta"):
+        np.testing.assert_allclose(getattr(first, name), getattr(second, name), atol=1e-8)
+    assert np.array_equal(exact.motion.time, exact.recording.time)
+    assert exact.motion.time[samples] == pytest.approx(exact.period)
+
+
+def test_unsettled_motion_is_said(leg, leg_series, quiet):
+    run = simulate(leg, leg_series, periods=1, settling=Settling(tolerance=1e-30, longest=2), **quiet)
+    assert run.settling_periods == 2
+    assert any("still changes" in text for text in run.warnings)
+    assert "still changes" in run.summary()
+
+
+def test_motors_track_the_reference_and_the_links_do_not(exact):
+    motor_error = np.sqrt(np.mean((exact.motion.theta - exact.reference.theta) ** 2, axis=0))
+    link_error = np.sqrt(np.mean((exact.motion.q - exact.reference.theta) ** 2, axis=0))
+    assert np.all(motor_error < 0.02)
+    assert np.all(link_error[:2] > 3.0 * motor_error[:2])
+
+
+def test_equal_seeds_give_equal_recordings_and_others_do_not(leg, leg_series):
+    one, two, three = (simulate(leg, leg_series, periods=1, seed=seed) for seed in (7, 7, 8))
+    for name, values in one.recording.columns.items():
+        assert np.array_equal(values, two.recording.columns[name])
+        if not name.split("_")[1].startswith("reference"):
+            assert not np.array_equal(values, three.recording.columns[name])
+    assert np.array_equal(one.motion.ddq, two.motion.ddq)
+
+
+def test_jitter_of_one_seed_does_not_depend_on_the_sensors(leg, leg_series):
+    noisy = simulate(leg, leg_series, periods=1, seed=4)
+    clean = simulate(leg, leg_series, periods=1, seed=4, sensors=SensorNoise.none())
+    assert np.array_equal(noisy.motion.q, clean.motion.q)
+
+
+def test_recording_holds_what_identification_needs(leg, leg_series):
+    recording = simulate(leg, leg_series, periods=1).recording
+    kinds = ("q", "theta", "current", "theta_reference")
+    assert set(recording.columns) == {f"{kind}_{name}" for kind in kinds for name in leg.joint_names}
+    assert recording.joints == leg.joint_names
+    assert recording.sample_rate == pytest.approx(200.0)
+
+
+def test_rigid_robot_without_annotation(quiet):
+    robot = ur10()
+    run = simulate(robot, modest_series(robot), periods=1, **quiet)
+    assert np.array_equal(run.motion.theta, run.motion.q)
+    assert not np.any(run.tau_spring)
+    assert run.recording.has("tau_motor", "elbow_joint")
+    assert not run.recording.has("theta", "elbow_joint")
+    assert run.recording.has("q_reference", "elbow_joint")
+
+
+def test_single_pass_starts_in_equilibrium_and_ends_with_the_reference(leg, quiet):
+    time = np.linspace(2.0, 3.5, 301)
+    share = (time - 2.0) / 1.5
+    start, end = np.array([0.3, -0.1, 0.2]), np.array([0.5, -0.2, 0.6])
+    smooth = (10 * share**3 - 15 * share**4 + 6 * share**5)[:, None]
+    rate = (30 * share**2 - 60 * share**3 + 30 * share**4)[:, None] / 1.5
+    acceleration = (60 * share - 180 * share**2 + 120 * share**3)[:, None] / 1.5**2
+    reach = end - start
+    reference = Motion.rigid(time, start + reach * smooth, reach * rate, reach * acceleration)
+    run = simulate(leg, reference, **quiet)
+    assert run.period is None
+    assert np.isnan(run.settled)
+    np.testing.assert_allclose(run.motion.time, time, atol=1e-12)
+    np.testing.assert_allclose(run.reference.theta, reference.q, atol=1e-9)
+    assert np.abs(run.motion.ddq[0]).max() < 0.5
+    assert np.abs(run.motion.theta[-1] - end).max() < 0.02
+
+
+def test_started_in_its_own_state_a_simulation_goes_on_as_before(leg, leg_series, quiet, exact):
+    again = simulate(leg, leg_series, periods=1, start=exact.motion[0:1], **quiet)
+    assert again.settling_periods == 0
+    assert np.array_equal(again.motion.q, exact.motion.q[: len(again.motion)])
+
+
+def test_controller_knows_the_description_and_not_the_plant(leg, leg_series, quiet):
+    truth = plant_from_robot(leg)
+    heavier = truth.replace(viscous_friction=3.0 * truth.viscous_friction)
+    one = simulate(leg, leg_series, periods=1, **quiet)
+    other = simulate(leg, leg_series, periods=1, plant=heavier, **quiet)
+    assert np.array_equal(one.reference.theta, other.reference.theta)
+    assert np.abs(one.motion.theta - other.motion.theta).max() > 1e-3
+
+
+def test_computed_torque_brings_the_links_where_they_are_wanted(leg, quiet):
+    series = modest_series(leg, base_frequency=0.4, seed=4)
+    plain, computed = (
+        simulate(leg, series, periods=1, controller=controller, **quiet)
+        for controller in (VelocityController(), ComputedTorque())
+    )
+    error = [np.sqrt(np.mean((run.motion.q - series.evaluate(run.motion.time)) ** 2)) for run in (plain, computed)]
+    assert error[1] < 1e-3
+    assert error[1] < 0.1 * error[0]
+
+
+def test_diverging_motion_names_joint_and_time():
+    robot = from_parts(
+        '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"),
+        motor("swing", 'stiffness="100" damping="0.1"'),
+    )  # fmt: skip
+    pushing = Wave((1.0,), 1.0, (-4000.0,), (-50.0,))
+    with pytest.raises(SeaIdentError, match=r"diverged at -?\d+\.\d+ s.*'swing'"):
+        simulate(robot, modest_series(robot), controller=pushing)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "spring", "missing"),
+    [
+        ("<coulombFriction>1</coulombFriction>", 'stiffness="100" damping="1"', "swing: viscousFriction"),
+        ("<viscousFriction>1</viscousFriction>", 'stiffness="100" damping="1"', "swing: coulombFriction"),
+        ("", 'damping="1"', "swing: stiffness"),
+        ("", 'stiffness="100"', "swing: damping"),
+    ],
+)
+def test_missing_numbers_are_named(numbers, spring, missing):
+    robot = from_parts(
+        '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"), motor("swing", spring, numbers)
+    )
+    with pytest.raises(SeaIdentError, match=missing):
+        simulate(robot, modest_series(robot), periods=1)
+
+
+def test_missing_rotor_inertia_is_named():
+    with pytest.raises(SeaIdentError, match="output: rotorInertia"):
+        plant_from_robot(load_robot("hebi_x5"))
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"periods": 0}, "periods 0"),
+        ({"rate": -1.0}, "rate -1"),
+        ({"step": 0.0}, "step 0"),
+        ({"friction": [SmoothCoulomb()]}, "1 friction laws for 3 joints"),
+    ],
+)
+def test_impossible_requests_are_refused(leg, leg_series, options, match):
+    with pytest.raises(SeaIdentError, match=match):
+        simulate(leg, leg_series, **options)
+
+
+def test_reference_of_another_robot_is_refused(leg):
+    with pytest.raises(SeaIdentError, match="2 joints"):
+        simulate(leg, FourierSeries(0.1, np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1))))
+    with pytest.raises(SeaIdentError, match="give a FourierSeries"):
+        simulate(leg, np.zeros((10, 3)))
+
+
+def test_overload_is_said(leg, quiet):
+    fast = modest_series(leg, base_frequency=2.5, share=0.9)
+    run = simulate(leg, fast, periods=1, **quiet)
+    assert any("its limit is" in text for text in run.warnings)
+
+
+def test_friction_jitters_by_default(leg, leg_series):
+    varied = simulate(leg, leg_series, periods=1, sensors=SensorNoise.none())
+    alike = simulate(leg, leg_series, periods=1, sensors=SensorNoise.none(), jitter=FrictionJitter.none())
+    assert np.abs(varied.motion.theta - alike.motion.theta).max() > 1e-5
