@@ -26,6 +26,8 @@ _HOME = {
     "read_model": "estimation",
     "Validation": "validation",
     "validate": "validation",
+    "export_mjcf": "export",
+    "export_urdf": "export",
     "SeaIdentError": "exceptions",
     "SeaIdentWarning": "exceptions",
 }
@@ -43,6 +45,8 @@ __all__ = [
     "Validation",
     "build_regressor",
     "design_excitation",
+    "export_mjcf",
+    "export_urdf",
     "find_base_parameters",
     "identify",
     "identify_springs",
@@ -59,6 +63,7 @@ if TYPE_CHECKING:
     from sea_ident.estimation import Model, identify, identify_springs, read_model
     from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
     from sea_ident.excitation import Excitation, design_excitation, read_excitation
+    from sea_ident.export import export_mjcf, export_urdf
     from sea_ident.motion import FourierSeries, Motion
     from sea_ident.processing import ProcessedRecording, process
     from sea_ident.regressor import build_regressor

@@ -36,6 +36,10 @@ class ModelFileError(SeaIdentError):
     """A saved model, excitation or diagnosis cannot be read."""
 
 
+class ExportError(SeaIdentError):
+    """A model cannot be written in the format asked for."""
+
+
 class DiagnosisError(SeaIdentError):
     """A model and a recording cannot be compared as asked."""
 

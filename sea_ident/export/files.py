@@ -1,0 +1,117 @@
+"""An identified model as a file for other tools."""
+
+import warnings as python_warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from sea_ident.estimation import Model, physical_parameters
+from sea_ident.exceptions import ExportError, RecordingError, SeaIdentWarning
+from sea_ident.export.mjcf import mjcf_text
+from sea_ident.export.urdf import urdf_text
+from sea_ident.export.values import ExportValues, collect_values
+from sea_ident.recordings.atomic import atomic_file
+
+
+@dataclass(frozen=True)
+class Export:
+    """What was written.
+
+    Attributes:
+        path: the file.
+        format: urdf or mjcf.
+        notes: how the freedom that data leave was filled.
+        warnings: what of the model the file does not hold.
+    """
+
+    path: Path
+    format: str
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def summary(self) -> str:
+        """The file and what to know about it."""
+        lines = [f"{self.path} ({self.format})"]
+        lines.extend(f"  {text}" for text in self.notes)
+        lines.extend(f"  warning: {text}" for text in self.warnings)
+        return "\n".join(lines)
+
+
+def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
+    """Full standard parameters and springs of an identified model.
+
+    Base parameters fix combinations only; what they leave free is filled by the physically consistent values nearest to
+    those of the URDF.
+
+    Args:
+        model: the identified model.
+
+    Returns:
+        The values, notes, and warnings for the user.
+
+    Raises:
+        IdentificationError: if no physically consistent parameters are found.
+    """
+    physical = physical_parameters(model)
+    values = collect_values(model.robot, physical.columns, physical.values)
+    laws = {spring.joint: spring.law for spring in model.springs}
+    joints = []
+    for joint in values.joints:
+        if joint.joint in laws:
+            stiffness, cubic, damping = laws[joint.joint]
+            joint = replace(joint, stiffness=stiffness, cubic_stiffness=cubic, damping=damping)
+        joints.append(joint)
+    notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
+    warnings = [] if physical.consistent else [physical.summary().splitlines()[0]]
+    return replace(values, joints=tuple(joints)), notes, warnings
+
+
+def export_urdf(model: Model, path: str | Path) -> Export:
+    """Write an identified model as URDF: the user's own file with the identified values in it.
+
+    Inertials of moving links, friction (`<dynamics>`) and transmissions are replaced; all else is left as it was,
+    comments included. `load_robot` of the file gives a robot whose priors are the identified values.
+
+    Args:
+        model: the identified model.
+        path: the file to be written.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ExportError: if the model cannot be written as URDF, or the file cannot be written.
+        IdentificationError: if no physically consistent parameters are found.
+    """
+    values, notes, warnings = model_values(model)
+    text, remarks = urdf_text(values)
+    return _write(path, "urdf", text, notes, [*warnings, *remarks])
+
+
+def export_mjcf(model: Model, path: str | Path) -> Export:
+    """Write an identified model as MJCF, with rotors as bodies and springs as tendons (see `sea_ident.export.mjcf`).
+
+    Args:
+        model: the identified model.
+        path: the file to be written.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ExportError: if MuJoCo could not hold the model, or the file cannot be written.
+        IdentificationError: if no physically consistent parameters are found.
+    """
+    values, notes, warnings = model_values(model)
+    text, remarks = mjcf_text(values)
+    return _write(path, "mjcf", text, notes, [*warnings, *remarks])
+
+
+def _write(path: str | Path, kind: str, text: str, notes: list[str], warnings: list[str]) -> Export:
+    try:
+        with atomic_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except RecordingError as error:
+        raise ExportError(str(error)) from None
+    for warning in warnings:
+        python_warnings.warn(f"{path}: {warning}", SeaIdentWarning, stacklevel=3)
+    return Export(Path(path), kind, tuple(notes), tuple(warnings))
