@@ -1,6 +1,15 @@
 """Estimation: base parameters, springs, and how sure both are."""
 
-from sea_ident.estimation.estimators import Estimate, Estimator, JointWLS, LeastSquares, PerSampleWLS
+from sea_ident.estimation.estimators import (
+    Estimate,
+    Estimator,
+    InstrumentalVariables,
+    JointWLS,
+    LeastSquares,
+    MaximumLikelihood,
+    PerSampleWLS,
+    Robust,
+)
 from sea_ident.estimation.identify import identify
 from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
 from sea_ident.estimation.model_file import model_from_dict, read_model
@@ -16,14 +25,17 @@ __all__ = [
     "Estimator",
     "Excerpt",
     "Fit",
+    "InstrumentalVariables",
     "JointWLS",
     "LeastSquares",
+    "MaximumLikelihood",
     "Model",
     "Observations",
     "Parameter",
     "PerSampleWLS",
     "PhysicalParameters",
     "Pull",
+    "Robust",
     "SpringResult",
     "Uncertainty",
     "Verdict",

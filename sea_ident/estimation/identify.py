@@ -16,7 +16,7 @@ from sea_ident.estimation.estimators import Estimate, Estimator, PerSampleWLS
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.estimation.solve import condition_number, solve_weighted
-from sea_ident.estimation.springs import identify_springs, spring_rows
+from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.motion import Motion
@@ -90,10 +90,9 @@ def identify(
     found.extend([*estimate.warnings, *uncertainty.warnings])
     found.extend(_check_signs(observations))
     model = _model(observations, estimate, uncertainty, how.name)
-    if robot.elastic_indices.size:
-        springs = identify_springs(model, processed, unknown_zero=unknown_zero)
-        found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict == "circular")
-        model = replace(model, springs=springs)
+    springs = springs_from(observations, estimate.values, uncertainty, unknown_zero)
+    found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict == "circular")
+    model = replace(model, springs=springs)
     for text in found[first:]:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return replace(model, warnings=tuple(dict.fromkeys(found)), notes=(*processed.notes, *estimate.notes))
@@ -263,10 +262,7 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
     )
     thin = slice(None, None, max(1, -(-processed.samples // EXCERPT)))
     motion = processed.motion[thin]
-    spring = np.zeros((len(motion), 0))
-    if observations.robot.elastic_indices.size:
-        part = spring_rows(model, motion, processed.tau_motor[thin])
-        spring = part.offset + part.rows @ estimate.values
+    spring = observations.spring_torque(observations.mean, processed.tau_motor, estimate.values)[thin]
     excerpt = Excerpt(
         motion=motion,
         tau_motor=processed.tau_motor[thin],

@@ -1,7 +1,8 @@
 """What estimators see: the regressor of the base parameters and the torques, of the mean and of every period."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +15,7 @@ from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
-from sea_ident.regressor import build_regressor
+from sea_ident.regressor import Regressor, build_regressor
 from sea_ident.robot import Robot
 
 CHUNK = 1000
@@ -22,6 +23,31 @@ CHUNK = 1000
 
 REVERSAL = 2.0
 """Speed, in v_off, below which Coulomb friction is not modelled (paper, eq. 3)."""
+
+CACHE = 400 * 2**20
+"""Bytes of period regressors that are kept rather than computed again."""
+
+
+class SpringSide(Enum):
+    """Rows from which the spring torque follows."""
+
+    LINK = "link"
+    MOTOR = "motor"
+    NONE = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Regressor of a motion in the base parameters.
+
+    Attributes:
+        total: (N, n, b) motor torque is ``total @ values`` (paper, eq. 8).
+        spring: (N, m, b) spring torque of the m elastic joints is ``spring @ values`` from link rows; from motor rows
+            the motor torque is to be added. Empty columns where neither determines it.
+    """
+
+    total: FloatArray
+    spring: FloatArray
 
 
 def base_rows(
@@ -33,13 +59,42 @@ def base_rows(
 ) -> FloatArray:
     """(N, n, b) rows of the motor torque in the base parameters (paper, eq. 8)."""
     rows = np.empty((len(motion), robot.n, base.rank))
+    for part, regressor in _chunks(robot, effects, motion, channels):
+        np.add(regressor.link[:, :, base.independent], regressor.motor[:, :, base.independent], out=rows[part])
+    return rows
+
+
+def spring_side(robot: Robot, effects: Sequence[Effect], base: BaseParameters, motion: Motion) -> SpringSide:
+    """From which rows the base parameters determine the spring torques: the link rows where possible.
+
+    Link rows need no torque measurement. A rigid joint before an elastic one can hide what they need.
+    """
+    elastic = robot.elastic_indices
+    if not elastic.size:
+        return SpringSide.NONE
+    regressor = build_regressor(robot, effects, motion[:: max(1, len(motion) // 100)], None)
+    if _determined(regressor.link[:, elastic], base):
+        return SpringSide.LINK
+    if _determined(regressor.motor[:, elastic], base):
+        return SpringSide.MOTOR
+    return SpringSide.NONE
+
+
+def _determined(columns: FloatArray, base: BaseParameters) -> bool:
+    """Whether rows in all parameters are rows in the base parameters."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    scale = np.abs(flat).max(axis=0)
+    left = np.abs(flat - flat[:, base.independent] @ base.grouping).max(axis=0)
+    return bool(np.all(left <= 1e-7 * np.maximum(scale, 1e-6 * scale.max(initial=0.0))))
+
+
+def _chunks(
+    robot: Robot, effects: Sequence[Effect], motion: Motion, channels: Mapping[str, FloatArray] | None
+) -> Iterator[tuple[slice, Regressor]]:
     for start in range(0, len(motion), CHUNK):
         part = slice(start, start + CHUNK)
         some = None if channels is None else {kind: values[part] for kind, values in channels.items()}
-        regressor = build_regressor(robot, effects, motion[part], some)
-        rows[part] = regressor.link[:, :, base.independent]
-        rows[part] += regressor.motor[:, :, base.independent]
-    return rows
+        yield part, build_regressor(robot, effects, motion[part], some)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +124,48 @@ class Observations:
         return self.processed.periods
 
     @cached_property
-    def rows(self) -> FloatArray:
-        """(N, n, b) regressor of the mean motion."""
-        return base_rows(self.robot, self.effects, self.base, self.processed.motion, self.processed.channels)
+    def spring_side(self) -> SpringSide:
+        """From which rows the spring torques follow."""
+        return spring_side(self.robot, self.effects, self.base, self.processed.motion)
+
+    def rows_of(self, motion: Motion) -> Rows:
+        """Regressor of a motion with the samples of a period; channels are those of the mean."""
+        robot, base = self.robot, self.base
+        elastic = robot.elastic_indices
+        side = self.spring_side
+        total = np.empty((len(motion), robot.n, base.rank))
+        spring = np.zeros((len(motion), len(elastic), base.rank))
+        for part, regressor in _chunks(robot, self.effects, motion, self.processed.channels):
+            link, motor = regressor.link[:, :, base.independent], regressor.motor[:, :, base.independent]
+            np.add(link, motor, out=total[part])
+            if side is SpringSide.LINK:
+                spring[part] = link[:, elastic]
+            elif side is SpringSide.MOTOR:
+                spring[part] = -motor[:, elastic]
+        return Rows(total, spring)
 
     @cached_property
-    def period_rows(self) -> FloatArray:
-        """(P, N, n, b) regressor of the motion of every period; empty where only one is there."""
-        parts = [base_rows(self.robot, self.effects, self.base, motion) for motion in self.processed.period_motions]
-        return np.stack(parts) if parts else np.zeros((0, *self.rows.shape))
+    def mean(self) -> Rows:
+        """Regressor of the mean motion."""
+        return self.rows_of(self.processed.motion)
+
+    @property
+    def rows(self) -> FloatArray:
+        """(N, n, b) regressor of the mean motion."""
+        return self.mean.total
+
+    @cached_property
+    def _kept_periods(self) -> list[Rows]:
+        return [self.rows_of(motion) for motion in self.processed.period_motions]
+
+    def each_period(self) -> Iterator[Rows]:
+        """Regressor of the motion of every period; computed once where that fits into memory."""
+        parts = self.processed.period_motions
+        width = self.robot.n + len(self.robot.elastic_indices)
+        if len(parts) * self.processed.samples * width * self.base.rank * 8 <= CACHE:
+            yield from self._kept_periods
+        else:
+            yield from (self.rows_of(motion) for motion in parts)
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
@@ -105,12 +193,21 @@ class Observations:
         left: FloatArray = self.torque - self.rows @ values
         return left
 
-    def period_residuals(self, values: FloatArray) -> FloatArray:
-        """(P, N, n) residual of every period, each with its own motion, so that all noise is in it."""
-        left = np.empty_like(self.processed.period_tau_motor)
+    def period_residuals(self, values: FloatArray, torque: FloatArray | None = None) -> FloatArray:
+        """(P, N, n) residual of every period, each with its own motion, so that all noise is in it.
+
+        Args:
+            values: (b,) parameters.
+            torque: (P, N, n) torques in place of the measured ones.
+        """
+        measured = self.processed.period_tau_motor if torque is None else torque
         if not self.processed.period_motions:
-            return left[:0]
-        for p, motion in enumerate(self.processed.period_motions):
-            rows = base_rows(self.robot, self.effects, self.base, motion)
-            left[p] = self.processed.period_tau_motor[p] - rows @ values
-        return left
+            return np.zeros((0, *measured.shape[1:]))
+        return np.stack([measured[p] - rows.total @ values for p, rows in enumerate(self.each_period())])
+
+    def spring_torque(self, rows: Rows, tau_motor: FloatArray, values: FloatArray) -> FloatArray:
+        """(N, m) spring torque of the elastic joints by the dynamic model [N m] (paper, eqs. 1-2)."""
+        torque: FloatArray = rows.spring @ values
+        if self.spring_side is SpringSide.MOTOR:
+            torque = torque + tau_motor[:, self.robot.elastic_indices]
+        return torque

@@ -9,11 +9,11 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.estimation.uncertainty import student_factor
+from sea_ident.estimation.observations import Observations, SpringSide
+from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty, student_factor
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
-from sea_ident.regressor import build_regressor
 
 if TYPE_CHECKING:
     from sea_ident.estimation.model import Model
@@ -106,67 +106,6 @@ class SpringResult:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class SpringRows:
-    """Spring torques as rows of the base parameters of the first step.
-
-    Attributes:
-        offset: (N, m) part that does not depend on them [N m]: the motor torque where motor rows are used.
-        rows: (N, m, b) ``tau_spring = offset + rows @ values``.
-    """
-
-    offset: FloatArray
-    rows: FloatArray
-
-
-def spring_rows(model: "Model", motion: Motion, tau_motor: FloatArray) -> SpringRows:
-    """The spring torque of every elastic joint from the link rows (paper, eq. 1), else from the motor rows (eq. 2).
-
-    Link rows need no torque measurement. They serve where the base parameters determine them, which is checked column
-    by column; a rigid joint before an elastic one can hide what they need.
-
-    Args:
-        model: the identified dynamic model, without springs.
-        motion: (N, n).
-        tau_motor: (N, n) [N m].
-
-    Returns:
-        Rows for the m elastic joints.
-
-    Raises:
-        IdentificationError: neither determines the spring torque.
-    """
-    robot, base = model.robot, model.base
-    elastic = robot.elastic_indices
-    rows = np.empty((len(motion), len(elastic), base.rank))
-    use_link: bool | None = None
-    for start in range(0, len(motion), 1000):
-        part = slice(start, start + 1000)
-        regressor = build_regressor(robot, model.effects, motion[part])
-        if use_link is None:
-            if _determined(regressor.link[:, elastic], base.independent, base.grouping):
-                use_link = True
-            elif _determined(regressor.motor[:, elastic], base.independent, base.grouping):
-                use_link = False
-            else:
-                raise IdentificationError(
-                    f"{robot.name}: the base parameters determine neither the link rows nor the motor rows of the "
-                    "elastic joints, so the spring torque is not known; give priors or record more kinds of motion"
-                )
-        side = regressor.link if use_link else -regressor.motor
-        rows[part] = side[:, elastic][:, :, base.independent]
-    offset = np.zeros((len(motion), len(elastic))) if use_link else tau_motor[:, elastic]
-    return SpringRows(offset, rows)
-
-
-def _determined(columns: FloatArray, independent: np.typing.NDArray[np.intp], grouping: FloatArray) -> bool:
-    """Whether rows in all parameters are rows in the base parameters."""
-    flat = columns.reshape(-1, columns.shape[-1])
-    scale = np.abs(flat).max(axis=0)
-    left = np.abs(flat - flat[:, independent] @ grouping).max(axis=0)
-    return bool(np.all(left <= 1e-7 * np.maximum(scale, 1e-6 * scale.max(initial=0.0))))
-
-
 def identify_springs(
     model: "Model", processed: ProcessedRecording, *, unknown_zero: Sequence[str] = ()
 ) -> tuple[SpringResult, ...]:
@@ -184,38 +123,65 @@ def identify_springs(
         IdentificationError: the spring torque cannot be computed.
         RobotError: `unknown_zero` names a joint that is no elastic joint.
     """
-    robot = model.robot
+    observations = Observations(model.robot, model.effects, model.base, processed)
+    return springs_from(observations, model.values, model.uncertainty, unknown_zero)
+
+
+def springs_from(
+    observations: Observations, values: FloatArray, uncertainty: Uncertainty, unknown_zero: Sequence[str] = ()
+) -> tuple[SpringResult, ...]:
+    """As `identify_springs`, from observations and the (b,) base parameters found from them."""
+    robot, processed = observations.robot, observations.processed
     elastic = robot.elastic_indices
-    if not elastic.size:
-        return ()
     for name in unknown_zero:
         robot.spring(name)
-    parts = processed.period_motions or (processed.motion,)
-    mean = spring_rows(model, processed.motion, processed.tau_motor)
-    tau = mean.offset + mean.rows @ model.values
-    influences = model.uncertainty.influences
+    if not elastic.size:
+        return ()
+    if observations.spring_side is SpringSide.NONE:
+        raise IdentificationError(
+            f"{robot.name}: the base parameters determine neither the link rows nor the motor rows of the elastic "
+            "joints, so the spring torque is not known; give priors or record more kinds of motion"
+        )
+    tau = observations.spring_torque(observations.mean, processed.tau_motor, values)
     per_period = None
-    if processed.periods > 1 and len(influences) == processed.periods:
-        per_period = []
-        for p, motion in enumerate(parts):
-            rows = spring_rows(model, motion, processed.period_tau_motor[p])
-            per_period.append((motion, rows.offset + rows.rows @ model.values))
+    if processed.periods > 1 and len(uncertainty.influences) == processed.periods:
+        per_period = [
+            (motion, observations.spring_torque(rows, torque, values))
+            for motion, rows, torque in zip(
+                processed.period_motions, observations.each_period(), processed.period_tau_motor, strict=True
+            )
+        ]
     results = []
     for k, joint in enumerate(elastic):
         name = robot.joint_names[joint]
-        circular = circular_factor(processed, int(joint))
-        result = _one_spring(
-            name, int(joint), processed.motion, tau[:, k], mean.rows[:, k], model, per_period, k, name in unknown_zero
+        own = None if per_period is None else [(motion, torque[:, k]) for motion, torque in per_period]
+        data = _SpringData(
+            name, int(joint), processed.motion, tau[:, k], observations.mean.spring[:, k], own, uncertainty
         )
-        if circular is not None:
+        result = _one_spring(data, name in unknown_zero)
+        factor = circular_factor(processed, int(joint))
+        if factor is not None:
             result = replace(
                 result,
                 verdict=Verdict.CIRCULAR,
-                note=f"the torque channel is {abs(circular):.6g} x the deflection: a fit returns that factor, whatever "
+                note=f"the torque channel is {abs(factor):.6g} x the deflection: a fit returns that factor, whatever "
                 "the spring is",
             )
         results.append(result)
     return tuple(results)
+
+
+@dataclass(frozen=True, eq=False)
+class _SpringData:
+    """What is known of one spring: its torque as the dynamic model gives it, with rows (N, b) for its uncertainty."""
+
+    name: str
+    joint: int
+    motion: Motion
+    tau: FloatArray
+    rows: FloatArray
+    per_period: list[tuple[Motion, FloatArray]] | None
+    uncertainty: Uncertainty
 
 
 def circular_factor(processed: ProcessedRecording, joint: int) -> float | None:
@@ -274,17 +240,8 @@ def _fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
     return zero
 
 
-def _one_spring(
-    name: str,
-    joint: int,
-    motion: Motion,
-    tau: FloatArray,
-    rows: FloatArray,
-    model: "Model",
-    per_period: list[tuple[Motion, FloatArray]] | None,
-    k: int,
-    unknown_zero: bool,
-) -> SpringResult:
+def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
+    name, joint, motion, tau = data.name, data.joint, data.motion, data.tau
     zero = _fit_zero(motion, joint, tau) if unknown_zero else 0.0
     columns = _columns(motion, joint, zero)
     scale = np.linalg.norm(columns, axis=0)
@@ -298,28 +255,11 @@ def _one_spring(
         design = np.column_stack([columns, -(guess[0] + 3.0 * guess[1] * columns[:, 0] ** 2)])
     norms = np.linalg.norm(design, axis=0)
     inverse = np.linalg.pinv(design / norms) / norms[:, None]  # (3 or 4, N)
-    target = tau + design[:, 3] * 0.0 if unknown_zero else tau
-    values = inverse @ target
-    residual = target - design @ values
-    law = values[:3]
-    if per_period is not None:
-        periods = len(per_period)
-        direct = []
-        for part, part_tau in per_period:
-            direct.append(inverse[:3] @ (part_tau[:, k] - _columns(part, joint, zero) @ law))
-        moves = np.array(direct)
-        moves = (moves - moves.mean(axis=0)) / periods + model.uncertainty.influences @ (inverse[:3] @ rows).T
-        covariance = moves.T @ moves * (periods / (periods - 1.0))
-        if model.uncertainty.degrees_of_freedom != periods - 1.0:
-            # few periods: the model's own covariance is better known than from the spread of so few
-            step = inverse[:3] @ rows
-            direct_only = (np.array(direct) - np.mean(direct, axis=0)) / periods
-            covariance = step @ model.covariance @ step.T + direct_only.T @ direct_only * (periods / (periods - 1.0))
-        freedom = model.uncertainty.degrees_of_freedom
-    else:
-        step = inverse[:3] @ rows
-        covariance = step @ model.covariance @ step.T + _residual_covariance(inverse[:3], residual)
-        freedom = model.uncertainty.degrees_of_freedom
+    values = inverse @ tau
+    residual = tau - design @ values
+    law, inverse = values[:3], inverse[:3]
+    covariance = _covariance(data, law, inverse, zero, residual)
+    freedom = data.uncertainty.degrees_of_freedom
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     linear = np.linalg.lstsq(columns[:, [0, 2]] / scale[[0, 2]], tau, rcond=None)[0] / scale[[0, 2]]
     held_out = _held_out(columns, motion, joint, zero, tau)
@@ -344,6 +284,32 @@ def _one_spring(
         held_out=held_out,
         note=note,
     )
+
+
+def _covariance(
+    data: _SpringData, law: FloatArray, inverse: FloatArray, zero: float, residual: FloatArray
+) -> FloatArray:
+    """(3, 3) covariance of K1, K3, D, with that of the dynamic model in it.
+
+    Every period moves the law in two ways that are not independent: by its own deflections, and by its share in the
+    dynamic model. Both are added up before they are squared.
+    """
+    uncertainty = data.uncertainty
+    step = inverse @ data.rows
+    if data.per_period is None:
+        return np.asarray(
+            step @ uncertainty.covariance @ step.T + _residual_covariance(inverse, residual), dtype=np.float64
+        )
+    periods = len(data.per_period)
+    factor = periods / (periods - 1.0)
+    direct = np.array([inverse @ (tau - _columns(motion, data.joint, zero) @ law) for motion, tau in data.per_period])
+    direct = (direct - direct.mean(axis=0)) / periods
+    if uncertainty.kind in (CovarianceKind.PERIODS, CovarianceKind.REMAINDER) and periods >= FEW_PERIODS:
+        moves = direct + uncertainty.influences @ step.T
+        rest = uncertainty.covariance - uncertainty.repeatability
+        return np.asarray(moves.T @ moves * factor + step @ rest @ step.T, dtype=np.float64)
+    # few periods: the model's own covariance is better known than from the spread of so few
+    return np.asarray(step @ uncertainty.covariance @ step.T + direct.T @ direct * factor, dtype=np.float64)
 
 
 def _residual_covariance(inverse: FloatArray, residual: FloatArray) -> FloatArray:

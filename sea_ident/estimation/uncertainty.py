@@ -96,7 +96,7 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
         )
         none = np.zeros((0, len(estimate.values)))
         return Uncertainty(covariance, np.inf, CovarianceKind.RESIDUAL, none, covariance, (text,))
-    residuals = observations.period_residuals(estimate.values)
+    residuals = observations.period_residuals(estimate.values, estimate.period_torque)
     residuals -= residuals.mean(axis=0)
     periods = len(residuals)
     influences = np.einsum("pkn,knb->pb", residuals, estimate.instruments) @ estimate.inverse.T / periods

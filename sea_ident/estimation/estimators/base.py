@@ -8,6 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.estimation.observations import Observations
+from sea_ident.motion import Motion
 
 VARIANCE_FLOOR = 1e-6
 """Smallest variance of a sample as a share of the mean variance of its joint."""
@@ -26,6 +27,8 @@ class Estimate:
         weights: (N, n) weights of the residuals, inverse variances of the mean torque where they are known.
         covariance: (b, b) model-based covariance (paper, eq. 13).
         log_det_weighted: natural logarithm of det F' Sigma^-1 F.
+        period_torque: (P, N, n) torques that were used in place of the measured ones, None where those were used.
+        motion: motion that was used in place of the mean one, None where that was used.
         notes: what was done.
         warnings: what a user should know.
     """
@@ -36,6 +39,8 @@ class Estimate:
     weights: FloatArray
     covariance: FloatArray
     log_det_weighted: float
+    period_torque: FloatArray | None = None
+    motion: Motion | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 

@@ -1,0 +1,129 @@
+"""Instrumental variables: no bias from noise in the regressor, nor from a controller that feeds it back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.estimation.estimators.base import Estimate, Estimator, floored
+from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.solve import solve_weighted
+from sea_ident.exceptions import IdentificationError
+from sea_ident.motion import Motion
+from sea_ident.processing.process import SMOOTHING
+from sea_ident.processing.variance import smooth_over_phase
+
+Simulator = Callable[[Observations, FloatArray], Motion]
+"""From observations and base parameters (b,) to the motion, without noise, at the samples of the mean period."""
+
+
+@dataclass(frozen=True)
+class InstrumentalVariables(Estimator):
+    """Solve ``Z' (torque - F psi) = 0`` with instruments Z that have the signal of F but not its noise.
+
+    With a simulator, Z is the regressor of the simulated motion, with the parameters of the round before (IDIM-IV).
+    Without one, the instruments of every period are the regressors of all the others: their noise is another one.
+
+    Attributes:
+        simulator: gives the motion that the closed loop makes with given parameters.
+        smoothing: width of the window over which the torque variance is averaged [s].
+        rounds: rounds of simulation at most.
+
+    References:
+        Janot, Vandanjon, Gautier, A generic instrumental variable approach for industrial robot identification, IEEE
+        Transactions on Control Systems Technology, 2014.
+    """
+
+    simulator: Simulator | None = None
+    smoothing: float = SMOOTHING
+    rounds: int = 5
+
+    name: ClassVar[str] = "instrumental_variables"
+
+    def estimate(self, observations: Observations) -> Estimate:
+        """Estimate; see `Estimator.estimate`."""
+        processed = observations.processed
+        variance = processed.raw_tau_variance
+        if processed.periods > 1:
+            variance = smooth_over_phase(variance, processed.interval, self.smoothing)
+        variance, warnings = floored(variance / processed.periods)
+        weights = observations.valid / variance
+        first = solve_weighted(observations.rows, observations.torque, weights)
+        if self.simulator is not None:
+            return self._simulated(observations, weights, first.values, first.log_det, warnings)
+        return self._other_periods(observations, weights, first.log_det, warnings)
+
+    def _simulated(
+        self,
+        observations: Observations,
+        weights: FloatArray,
+        values: FloatArray,
+        log_det: float,
+        warnings: tuple[str, ...],
+    ) -> Estimate:
+        if self.simulator is None:
+            raise IdentificationError("instrumental variables: no simulator was given")
+        rows, torque = observations.rows, observations.torque
+        count = rows.shape[-1]
+        flat = rows.reshape(-1, count)
+        moved = np.inf
+        for _ in range(self.rounds):
+            motion = self.simulator(observations, values)
+            if len(motion) != len(rows):
+                raise IdentificationError(
+                    f"the simulated motion has {len(motion)} samples, the mean period has {len(rows)}; give it at the "
+                    "times of the mean motion"
+                )
+            instruments = observations.rows_of(motion).total * weights[:, :, None]
+            cross = instruments.reshape(-1, count).T @ flat
+            before, values = values, np.linalg.solve(cross, np.einsum("knb,kn->b", instruments, torque))
+            moved = float(np.max(np.abs(values - before) / np.maximum(np.abs(values), 1e-12)))
+            if moved < 1e-4:
+                break
+        inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
+        meat = np.einsum("knb,kn,knc->bc", instruments, 1.0 / np.where(weights > 0.0, weights, np.inf), instruments)
+        return Estimate(
+            values=values,
+            instruments=instruments,
+            inverse=inverse,
+            weights=weights,
+            covariance=inverse @ meat @ inverse.T,
+            log_det_weighted=log_det,
+            notes=(f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round",),
+            warnings=warnings,
+        )
+
+    def _other_periods(
+        self, observations: Observations, weights: FloatArray, log_det: float, warnings: tuple[str, ...]
+    ) -> Estimate:
+        processed = observations.processed
+        periods = processed.periods
+        if periods < 2:
+            raise IdentificationError(
+                f"{processed.source}: instruments from other periods need at least two periods; give a simulator"
+            )
+        count = observations.base.rank
+        whole = np.zeros_like(observations.rows)
+        for rows in observations.each_period():
+            whole += rows.total
+        cross, side = np.zeros((count, count)), np.zeros(count)
+        for p, rows in enumerate(observations.each_period()):
+            instruments = (whole - rows.total) / (periods - 1.0) * weights[:, :, None]
+            cross += instruments.reshape(-1, count).T @ rows.total.reshape(-1, count)
+            side += np.einsum("knb,kn->b", instruments, processed.period_tau_motor[p])
+        values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
+        inverse: FloatArray = np.asarray(np.linalg.inv(cross / periods), dtype=np.float64)
+        instruments = whole / periods * weights[:, :, None]
+        meat = np.einsum("knb,kn,knc->bc", instruments, 1.0 / np.where(weights > 0.0, weights, np.inf), instruments)
+        return Estimate(
+            values=values,
+            instruments=instruments,
+            inverse=inverse,
+            weights=weights,
+            covariance=inverse @ meat @ inverse.T,
+            log_det_weighted=log_det,
+            notes=("the instruments of every period are the regressors of the other periods",),
+            warnings=warnings,
+        )
