@@ -120,7 +120,8 @@ def raise_inside(
     Returns:
         (n, 2 L + 1) coefficients, inside; the criterion is never below that of the start.
     """
-    placed = place_inside(walls, centre, coefficients)
+    middle = [wall.values(centre) for wall in walls]
+    placed = place_inside(walls, middle, centre, coefficients)
     if placed is None:
         return coefficients
     point, sides = placed
@@ -139,7 +140,7 @@ def raise_inside(
             step, stepped, reached = model_step(gradient, damped, tangents, sides, barrier, point.shape)
             predicted = float(gradient @ step - 0.5 * step @ damped @ step)
             for halvings in range(4):
-                placed = place_inside(walls, centre, point + 0.4**halvings * step.reshape(point.shape))
+                placed = place_inside(walls, middle, centre, point + 0.4**halvings * step.reshape(point.shape))
                 if placed is not None:
                     found = criterion.value(information.eigenvalues(placed[0]))
                     if found > value:
@@ -173,19 +174,19 @@ def quadratic_model(information: Information, criterion: Criterion, point: Float
 
 
 def place_inside(
-    walls: Sequence[Wall], centre: FloatArray, coefficients: FloatArray
+    walls: Sequence[Wall], middle: Sequence[FloatArray], centre: FloatArray, coefficients: FloatArray
 ) -> tuple[FloatArray, list[Side]] | None:
     """Shrink a trajectory toward rest until it is inside between the grid points too.
 
     Args:
         walls: the limits.
+        middle: their values at rest.
         centre: (n, 2 L + 1) a trajectory at rest, inside.
         coefficients: (n, 2 L + 1) trajectory.
 
     Returns:
         The trajectory and its slacks, or None where it would have to shrink by more than half.
     """
-    middle = [wall.values(centre) for wall in walls]
     factor = 1.0
     for _ in range(4):
         trial = centre + factor * (coefficients - centre)
@@ -197,7 +198,7 @@ def place_inside(
             for sign, bound, beyond in ((1.0, wall.upper, above), (-1.0, wall.lower, below)):
                 finite = np.where(np.isfinite(bound), bound, sign * _OPEN)
                 slack = sign * (finite - value) - beyond
-                room = sign * (finite - middle[k])
+                room = sign * (finite - middle[k][:, :1])
                 tight = slack < _INSET * room
                 if np.any(tight):
                     room = np.broadcast_to(room, slack.shape)[tight]

@@ -13,8 +13,8 @@ linear in z. So is its torque: ``Y = J' F z`` with a constant F, and
 where a column of J upstream of joint k turns with it: dJ_j/dq_k = J_j x J_k for j < k.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pinocchio as pin
@@ -63,21 +63,19 @@ _WRENCH = _wrench_tensor()
 
 
 def _cross(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Cross product along axis 1, broadcasting over the others."""
+    """Cross product along axis 0, broadcasting over the others."""
     out = np.empty(np.broadcast_shapes(x.shape, y.shape))
-    x0, x1, x2 = x[:, 0], x[:, 1], x[:, 2]
-    y0, y1, y2 = y[:, 0], y[:, 1], y[:, 2]
-    np.subtract(x1 * y2, x2 * y1, out=out[:, 0])
-    np.subtract(x2 * y0, x0 * y2, out=out[:, 1])
-    np.subtract(x0 * y1, x1 * y0, out=out[:, 2])
+    np.subtract(x[1] * y[2], x[2] * y[1], out=out[0])
+    np.subtract(x[2] * y[0], x[0] * y[2], out=out[1])
+    np.subtract(x[0] * y[1], x[1] * y[0], out=out[2])
     return out
 
 
 def _motion_cross(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Cross product of spatial motions (linear, angular) along axis 1, broadcasting over the others."""
+    """Cross product of spatial motions (linear, angular) along axis 0, broadcasting over the others."""
     out = np.empty(np.broadcast_shapes(x.shape, y.shape))
-    np.add(_cross(x[:, 3:], y[:, :3]), _cross(x[:, :3], y[:, 3:]), out=out[:, :3])
-    out[:, 3:] = _cross(x[:, 3:], y[:, 3:])
+    np.add(_cross(x[3:], y[:3]), _cross(x[:3], y[3:]), out=out[:3])
+    out[3:] = _cross(x[3:], y[3:])
     return out
 
 
@@ -162,100 +160,205 @@ class BodyColumns:
         """Number of coordinates."""
         return len(self.parents) - 1
 
-    def evaluate(
-        self, x: FloatArray, v: FloatArray, a: FloatArray, *, derivatives: bool = True
-    ) -> tuple[FloatArray, FloatArray]:
-        """Columns and their derivatives.
+    def at(self, x: FloatArray, v: FloatArray, a: FloatArray) -> "BodyMotion":
+        """Kinematics of a motion.
 
         Args:
-            x: (N, J) positions.
-            v: (N, J) velocities.
-            a: (N, J) accelerations.
-            derivatives: whether to compute them.
+            x: (J, N) positions.
+            v: (J, N) velocities.
+            a: (J, N) accelerations.
 
         Returns:
-            (N, J, p) columns; (N, J, p, 3 J) derivatives with respect to x, v and a (empty if not asked for).
+            What columns and derivatives are computed from.
         """
-        samples, joints = x.shape
-        columns = np.zeros((samples, joints, self.count))
-        slopes = np.zeros((samples, joints, self.count, 3 * joints if derivatives else 0))
-        jacobians: dict[int, FloatArray] = {}
-        weight: dict[int, FloatArray] = {}
-        root = np.broadcast_to(-self.gravity[:, None], (samples, 3, 1))
-        for body in range(1, joints + 1):
-            parent = self.parents[body]
-            path = self.paths[body]
-            jacobian, gravity = self._step(body, x[:, body - 1], jacobians.get(parent), weight.get(parent, root))
-            jacobians[body], weight[body] = jacobian, gravity
-            if not len(self.places[body]):
+        samples = x.shape[1]
+        bodies: dict[int, _Body] = {}
+        known: dict[int, tuple[FloatArray | None, FloatArray]] = {
+            0: (None, np.broadcast_to(-self.gravity[:, None], (3, samples)))
+        }
+        carrying = {int(k) for body in range(1, self.joints + 1) if len(self.places[body]) for k in self.paths[body]}
+        for body in range(1, self.joints + 1):
+            if body not in carrying:
                 continue
-            rows, take = path - 1, self.places[body]
-            column, slope = self._body(body, jacobian, gravity, v[:, rows], a[:, rows], derivatives)
-            columns[:, rows[:, None], take] += column
-            if derivatives:
-                states = np.concatenate([rows, rows + joints, rows + 2 * joints])
-                slopes[:, rows[:, None, None], take[:, None], states] += slope
-        return columns, slopes
+            jacobian, weight = self._step(body, x[body - 1], *known[self.parents[body]])
+            known[body] = jacobian, weight
+            if len(self.places[body]):
+                rows = self.paths[body] - 1
+                bodies[body] = _Body.of(jacobian, weight, v[rows], a[rows])
+        return BodyMotion(self, samples, bodies)
 
     def _step(
         self, body: int, x: FloatArray, upstream: FloatArray | None, weight: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """(N, 6, m) Jacobian of a body in its own frame, and (N, 3, 1) minus gravity there."""
+        """(6, m, N) Jacobian of a body in its own frame, and (3, N) minus gravity there."""
         axis = self.axes[body]
-        linear, angular = axis[:3], axis[3:]
-        skew = _skew(angular)
-        sine, cosine = np.sin(x)[:, None, None], np.cos(x)[:, None, None]
-        turn = np.eye(3) + sine * skew + (1.0 - cosine) * (skew @ skew) if np.any(angular) else np.eye(3)[None]
-        rotation = self.rotations[body] @ turn  # (N, 3, 3) this frame in the parent's
-        back = np.swapaxes(rotation, 1, 2)
-        own = np.broadcast_to(axis[:, None], (len(x), 6, 1))
-        if upstream is None:
-            return own, back @ weight
-        shift = self.translations[body] + x[:, None] * (self.rotations[body] @ linear)
-        lever = _cross(shift[:, :, None], upstream[:, 3:])
-        moved = np.concatenate([back @ (upstream[:, :3] - lever), back @ upstream[:, 3:]], axis=1)
-        return np.concatenate([moved, own], axis=2), back @ weight
+        skew = _skew(axis[3:])
+        # rotation from the parent's frame: constant + sine + cosine part
+        parts = np.array([np.eye(3) + skew @ skew, -skew, -skew @ skew]) @ self.rotations[body].T
+        waves = np.array([np.ones_like(x), np.sin(x), np.cos(x)])
+        back = np.tensordot(parts, waves, axes=(0, 0))  # (3, 3, N)
 
-    def _body(
-        self, body: int, jacobian: FloatArray, weight: FloatArray, v: FloatArray, a: FloatArray, derivatives: bool
-    ) -> tuple[FloatArray, FloatArray]:
-        """(N, m, r) columns of one body and (N, m, r, 3 m) derivatives, along its path."""
-        samples, _, depth = jacobian.shape
-        tensor = self.tensors[body]
-        r = tensor.shape[1]
-        moving = jacobian * v[:, None]
-        velocity = np.cumsum(moving, axis=2)  # (N, 6, m) of each joint's own body, in this frame
-        turning = _motion_cross(velocity, jacobian)  # V_k x J_k
-        acceleration = np.cumsum(jacobian * a[:, None] + turning * v[:, None], axis=2)
-        acceleration[:, :3] += weight
-        total = velocity[:, :, -1]
-        linear, omega = total[:, :3], total[:, 3:]
-        alpha = acceleration[:, 3:, -1]
-        classical = acceleration[:, :3, -1] + _cross(omega, linear)
-        z = np.concatenate([classical, alpha, omega[:, _ROW] * omega[:, _COLUMN]], axis=1)
-        transposed = np.ascontiguousarray(np.swapaxes(jacobian, 1, 2))  # (N, m, 6)
-        levers = (transposed.reshape(-1, 6) @ tensor.reshape(6, -1)).reshape(samples, depth * r, 12)
-        column = (levers @ z[:, :, None]).reshape(samples, depth, r)
-        if not derivatives:
-            return column, column
-        # derivatives of the body's velocity and acceleration
-        before = velocity - moving  # V_{k-1}
-        acceleration_before = acceleration - jacobian * a[:, None] - turning * v[:, None]
-        downstream = total[:, :, None] - before
-        v_x = turning  # V_{k-1} x J_k = V_k x J_k
-        a_x = _motion_cross(acceleration_before, jacobian) + _motion_cross(v_x, downstream)
+        def turned(vectors: FloatArray) -> FloatArray:
+            return np.stack([(back[k][:, None] * vectors).sum(axis=0) for k in range(3)])
+
+        own = np.broadcast_to(axis[:, None, None], (6, 1, len(x)))
+        weight_here = turned(weight[:, None])[:, 0]
+        if upstream is None:
+            return own, weight_here
+        shift = self.translations[body][:, None] + np.outer(self.rotations[body] @ axis[:3], x)
+        linear = turned(upstream[:3] - _cross(shift[:, None], upstream[3:]))
+        return np.concatenate([np.concatenate([linear, turned(upstream[3:])]), own], axis=1), weight_here
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """One body in a motion; every quantity is in its own frame, samples last.
+
+    Attributes:
+        jacobian: (6, m, N) along its path.
+        velocity: (6, m, N) of each body of the path, as a motion of this frame.
+        turning: (6, m, N) velocity x jacobian.
+        acceleration: (6, m, N) of each body of the path, less gravity.
+        v: (m, N) joint velocities.
+        a: (m, N) joint accelerations.
+    """
+
+    jacobian: FloatArray
+    velocity: FloatArray
+    turning: FloatArray
+    acceleration: FloatArray
+    v: FloatArray
+    a: FloatArray
+
+    @staticmethod
+    def of(jacobian: FloatArray, weight: FloatArray, v: FloatArray, a: FloatArray) -> "_Body":
+        velocity = np.cumsum(jacobian * v, axis=1)
+        turning = _motion_cross(velocity, jacobian)
+        acceleration = np.cumsum(jacobian * a + turning * v, axis=1)
+        acceleration[:3] += weight[:, None]
+        return _Body(jacobian, velocity, turning, acceleration, v, a)
+
+    def some(self, stride: int) -> "_Body":
+        """Every so many samples."""
+        return _Body(*(getattr(self, f.name)[..., ::stride] for f in fields(self)))
+
+    def z(self) -> FloatArray:
+        """(12, N) classical acceleration less gravity, angular acceleration, products of angular velocity."""
+        total, last = self.velocity[:, -1], self.acceleration[:, -1]
+        omega = total[3:]
+        return np.concatenate([last[:3] + _cross(omega, total[:3]), last[3:], omega[_ROW] * omega[_COLUMN]])
+
+    def dz(self) -> FloatArray:
+        """(12, 3 m, N) derivative of z by positions, velocities and accelerations of the path."""
+        jacobian, turning = self.jacobian, self.turning
+        total = self.velocity[:, -1]
+        linear, omega = total[:3, None], total[3:, None]
+        # velocity and acceleration of what lies before each joint, and the velocity from it on
+        before = self.acceleration - jacobian * self.a - turning * self.v
+        downstream = total[:, None] - self.velocity + jacobian * self.v
+        # V_{k-1} x J_k = V_k x J_k = turning
+        a_x = _motion_cross(before, jacobian) + _motion_cross(turning, downstream)
         a_v = _motion_cross(jacobian, downstream) + turning
-        zero = np.zeros_like(jacobian)
-        dv = np.concatenate([v_x, jacobian, zero], axis=2)  # (N, 6, 3 m)
-        da = np.concatenate([a_x, a_v, jacobian], axis=2)
-        d_omega = dv[:, 3:]
-        d_classical = da[:, :3] + _cross(d_omega, linear[:, :, None]) + _cross(omega[:, :, None], dv[:, :3])
-        products = d_omega[:, _ROW] * omega[:, _COLUMN, None] + omega[:, _ROW, None] * d_omega[:, _COLUMN]
-        dz = np.concatenate([d_classical, da[:, 3:], products], axis=1)  # (N, 12, 3 m)
-        slope = (levers @ dz).reshape(samples, depth, r, 3 * depth)
-        # the rows turn with the joints downstream of them
-        wrench = (tensor.reshape(-1, 12) @ z.T).reshape(6, r, samples).transpose(2, 1, 0)  # (N, r, 6)
-        for k in range(1, depth):
-            turned = _motion_cross(jacobian[:, :, :k], jacobian[:, :, k : k + 1])  # (N, 6, k)
-            slope[:, :k, :, k] += np.swapaxes(wrench @ turned, 1, 2)
-        return column, slope
+        dv = np.concatenate([turning, jacobian], axis=1)
+        d_omega = dv[3:]
+        m = jacobian.shape[1]
+        out = np.zeros((12, 3 * m, jacobian.shape[2]))
+        out[:3, : 2 * m] = _cross(d_omega, linear) + _cross(omega, dv[:3])
+        for k, part in enumerate((a_x, a_v, jacobian)):
+            out[:3, k * m : (k + 1) * m] += part[:3]
+            out[3:6, k * m : (k + 1) * m] = part[3:]
+        out[6:, : 2 * m] = d_omega[_ROW] * omega[_COLUMN] + omega[_ROW] * d_omega[_COLUMN]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """Bodies in a motion of N samples: their columns, and derivatives by position, velocity and acceleration.
+
+    Attributes:
+        columns_of: the columns.
+        samples: N.
+        bodies: every body that has columns.
+    """
+
+    columns_of: BodyColumns
+    samples: int
+    bodies: Mapping[int, _Body]
+
+    def columns(self) -> FloatArray:
+        """(J, p, N) columns."""
+        chosen = self.columns_of
+        columns = np.zeros((chosen.joints, chosen.count, self.samples))
+        for index, body in self.bodies.items():
+            tensor, rows = chosen.tensors[index], chosen.paths[index] - 1
+            r = tensor.shape[1]
+            wrench = (tensor.reshape(6 * r, 12) @ body.z()).reshape(6, 1, r, self.samples)
+            column = body.jacobian[0][:, None] * wrench[0]
+            for axis in range(1, 6):
+                column += body.jacobian[axis][:, None] * wrench[axis]
+            columns[rows[:, None], chosen.places[index]] += column
+        return columns
+
+    def pull(self, lever: FloatArray) -> FloatArray:
+        """Gradient of a weighted sum of all columns.
+
+        Args:
+            lever: (J, p, N) weights.
+
+        Returns:
+            (3 J, N) derivatives by positions, velocities and accelerations.
+        """
+        chosen = self.columns_of
+        joints = chosen.joints
+        gradient = np.zeros((3 * joints, self.samples))
+        for index, body in self.bodies.items():
+            tensor, rows = chosen.tensors[index], chosen.paths[index] - 1
+            r, m = tensor.shape[1], len(rows)
+            weight = lever[rows[:, None], chosen.places[index]]  # (m, r, N)
+            gathered = np.zeros((6, r, self.samples))
+            for k in range(m):
+                gathered += body.jacobian[:, k, None] * weight[k]
+            force = tensor.reshape(6 * r, 12).T @ gathered.reshape(6 * r, self.samples)  # (12, N)
+            by_state = (body.dz() * force[:, None]).sum(axis=0)  # (3 m, N)
+            wrench = (tensor.reshape(6 * r, 12) @ body.z()).reshape(6, r, self.samples)
+            # rows upstream of joint k turn with it: J_j x J_k . (wrench of row j)
+            share = np.stack([(wrench * weight[k]).sum(axis=1) for k in range(m)], axis=1)  # (6, m, N)
+            moment = np.cumsum(_force_cross(body.jacobian, share), axis=1) - _force_cross(body.jacobian, share)
+            by_state[:m] -= (body.jacobian * moment).sum(axis=0)
+            for k in range(3):
+                gradient[rows + k * joints] += by_state[k * m : (k + 1) * m]
+        return gradient
+
+    def slopes(self, stride: int = 1) -> FloatArray:
+        """(N, J, p, 3 J) derivatives of every column at every so many samples."""
+        chosen = self.columns_of
+        joints = chosen.joints
+        samples = len(range(0, self.samples, stride))
+        slopes = np.zeros((samples, joints, chosen.count, 3 * joints))
+        for index, whole in self.bodies.items():
+            body = whole.some(stride)
+            tensor, rows, take = chosen.tensors[index], chosen.paths[index] - 1, chosen.places[index]
+            r, m = tensor.shape[1], len(rows)
+            transposed = np.ascontiguousarray(body.jacobian.transpose(2, 1, 0))  # (N, m, 6)
+            levers = (transposed.reshape(-1, 6) @ tensor.reshape(6, -1)).reshape(samples, m * r, 12)
+            slope = (levers @ np.ascontiguousarray(body.dz().transpose(2, 0, 1))).reshape(samples, m, r, 3 * m)
+            wrench = (tensor.reshape(6 * r, 12) @ body.z()).reshape(6, r, samples).transpose(2, 1, 0)
+            for k in range(1, m):
+                turned = _motion_cross(body.jacobian[:, :k], body.jacobian[:, k : k + 1])  # (6, k, N)
+                slope[:, :k, :, k] += np.swapaxes(wrench @ turned.transpose(2, 0, 1), 1, 2)
+            states = np.concatenate([rows, rows + joints, rows + 2 * joints])
+            if np.array_equal(rows, np.arange(m)) and len(take) and np.array_equal(take, take[0] + np.arange(r)):
+                for k in range(3):
+                    block = slopes[:, :m, take[0] : take[0] + r, k * joints : k * joints + m]
+                    block += slope[..., k * m : (k + 1) * m]
+            else:
+                slopes[:, rows[:, None, None], take[:, None], states] += slope
+        return slopes
+
+
+def _force_cross(motion: FloatArray, force: FloatArray) -> FloatArray:
+    """Cross product of a spatial motion with a wrench (force, moment) along axis 0."""
+    out = np.empty(np.broadcast_shapes(motion.shape, force.shape))
+    out[:3] = _cross(motion[3:], force[:3])
+    np.add(_cross(motion[3:], force[3:]), _cross(motion[:3], force[:3]), out=out[3:])
+    return out

@@ -1,19 +1,18 @@
-"""The columns of a model and their derivatives with respect to the state, for many samples at once."""
+"""The columns of a model in a motion and their derivatives by the state, for many samples at once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Effect, JointEffect, Side, State
-from sea_ident.effects.coulomb_friction import CoulombFriction
-from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.rigid_bodies import RigidBodies
 from sea_ident.effects.rotor_inertia import RotorInertia
-from sea_ident.effects.spring_damping import SpringDamping
-from sea_ident.effects.spring_stiffness import SpringStiffness
-from sea_ident.effects.viscous_friction import ViscousFriction
-from sea_ident.excitation.bodies import BodyColumns
+from sea_ident.excitation.bodies import BodyColumns, BodyMotion
+from sea_ident.excitation.local_slopes import local_slopes
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
@@ -21,17 +20,17 @@ from sea_ident.robot import Robot
 STATES = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
 
 
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """Columns at N samples and their derivatives.
+class _Part(Protocol):
+    """Columns of one effect in a motion; R rows, k columns, S states, N samples."""
 
-    Attributes:
-        columns: (N, R, p) rows of the information matrix: R = n sums, or 2 n link and motor rows.
-        slopes: (N, R, p, 6 n) derivatives by `STATES`; (N, R, p, 3 n) where theta = q moves along.
-    """
+    def columns(self) -> FloatArray:
+        """(R, k, N) columns."""
 
-    columns: FloatArray
-    slopes: FloatArray
+    def pull(self, lever: FloatArray) -> FloatArray:
+        """(S, N) gradient by the state of the sum of columns times a lever (R, k, N)."""
+
+    def slopes(self, stride: int) -> FloatArray:
+        """(N', R, k, S) derivatives at every so many samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +41,8 @@ class ModelColumns:
         robot: the robot.
         effects: the model.
         chosen: (p,) indices of its columns.
-        elastic: whether theta moves on its own; otherwise theta = q.
-        separate: whether link and motor rows are kept apart (needed for springs), or summed.
+        elastic: whether theta moves on its own (6 n states, as `STATES`); otherwise theta = q (3 n states).
+        separate: whether link and motor rows are kept apart (2 n rows, needed for springs) or summed (n rows).
     """
 
     robot: Robot
@@ -52,204 +51,296 @@ class ModelColumns:
     elastic: bool = False
     separate: bool = False
 
-    def evaluate(self, motion: Motion, *, derivatives: bool = True) -> Slopes:
-        """Columns and derivatives of a motion (theta = q unless `elastic`)."""
-        n, samples = self.robot.n, len(motion)
-        rows = 2 * n if self.separate else n
-        blocks = 6 if self.elastic else 3
-        columns = np.zeros((samples, rows, len(self.chosen)))
-        slopes = np.zeros((samples, rows, len(self.chosen), blocks * n if derivatives else 0))
+    @property
+    def rows(self) -> int:
+        """Number R of rows per sample."""
+        return (2 if self.separate else 1) * self.robot.n
+
+    @property
+    def states(self) -> int:
+        """Number S of states per sample."""
+        return (6 if self.elastic else 3) * self.robot.n
+
+    @cached_property
+    def _places(self) -> tuple[tuple[Effect, IntArray, IntArray], ...]:
+        """Every effect with its own chosen columns, and where they stand among all chosen."""
+        found = []
         start = 0
         for effect in self.effects:
             count = len(effect.columns(self.robot))
             here = np.flatnonzero((self.chosen >= start) & (self.chosen < start + count))
             if len(here):
-                self._add(effect, self.chosen[here] - start, here, motion, columns, slopes, derivatives)
+                found.append((effect, self.chosen[here] - start, here))
             start += count
-        return Slopes(columns, slopes)
+        return tuple(found)
 
-    def _add(
-        self,
-        effect: Effect,
-        which: IntArray,
-        here: IntArray,
-        motion: Motion,
-        columns: FloatArray,
-        slopes: FloatArray,
-        derivatives: bool,
-    ) -> None:
-        if isinstance(effect, RigidBodies | RotorInertia):
-            column, slope = self._bodies(effect, which, motion, derivatives)
-            columns[:, :, here] = column
-            if derivatives:
-                slopes[:, :, here] = slope
-        elif isinstance(effect, JointEffect):
-            self._joint(effect, which, here, motion, columns, slopes, derivatives)
-        else:
-            columns[:, :, here] = self._rows(effect, motion)[:, :, which]
-            if derivatives:
-                slopes[:, :, here] = self._differences(effect, which, motion)
+    @cached_property
+    def _bodies(self) -> dict[int, "_BodyMap"]:
+        """Of every effect made of bodies, by its place among the effects."""
+        return {
+            k: _BodyMap.of(self, effect, which)
+            for k, (effect, which, _) in enumerate(self._places)
+            if isinstance(effect, RigidBodies | RotorInertia)
+        }
 
-    # -- bodies ----------------------------------------------------------------------------------------------------
+    def at(self, motion: Motion) -> "ColumnMotion":
+        """The columns in a motion of N samples; its theta is ignored unless `elastic`."""
+        whole = motion if self.elastic else Motion.rigid(motion.time, motion.q, motion.dq, motion.ddq)
+        parts: list[_Part] = []
+        for k, (effect, which, _) in enumerate(self._places):
+            if k in self._bodies:
+                parts.append(self._bodies[k].at(whole))
+            elif isinstance(effect, JointEffect):
+                parts.append(_JointPart(self, effect, which, whole))
+            else:
+                parts.append(_OtherPart(self, effect, which, whole))
+        return ColumnMotion(self, len(motion), tuple(parts), tuple(here for _, _, here in self._places))
 
-    def _bodies(
-        self, effect: Effect, which: IntArray, motion: Motion, derivatives: bool
-    ) -> tuple[FloatArray, FloatArray]:
-        robot = self.robot
-        if isinstance(effect, RigidBodies) and not self.elastic and not self.separate:
+
+@dataclass(frozen=True, eq=False)
+class ColumnMotion:
+    """The chosen columns in a motion.
+
+    Attributes:
+        model: the columns.
+        samples: N.
+        parts: the columns of every effect.
+        places: where they stand among all.
+    """
+
+    model: ModelColumns
+    samples: int
+    parts: tuple[_Part, ...]
+    places: tuple[IntArray, ...]
+
+    def columns(self) -> FloatArray:
+        """(R, p, N) columns."""
+        columns = np.zeros((self.model.rows, len(self.model.chosen), self.samples))
+        for part, here in zip(self.parts, self.places, strict=True):
+            columns[:, here] = part.columns()
+        return columns
+
+    def pull(self, lever: FloatArray) -> FloatArray:
+        """(S, N) gradient by the state of the sum of columns times a lever (R, p, N)."""
+        gradient = np.zeros((self.model.states, self.samples))
+        for part, here in zip(self.parts, self.places, strict=True):
+            gradient += part.pull(lever[:, here])
+        return gradient
+
+    def slopes(self, stride: int = 1) -> FloatArray:
+        """(N', R, p, S) derivatives at every so many samples."""
+        if len(self.parts) == 1:
+            return self.parts[0].slopes(stride)
+        count = len(range(0, self.samples, stride))
+        slopes = np.zeros((count, self.model.rows, len(self.model.chosen), self.model.states))
+        for part, here in zip(self.parts, self.places, strict=True):
+            contiguous = np.array_equal(here, np.arange(here[0], here[-1] + 1))
+            slopes[:, :, slice(here[0], here[-1] + 1) if contiguous else here] = part.slopes(stride)
+        return slopes
+
+
+@dataclass(frozen=True, eq=False)
+class _BodyMap:
+    """Bodies of the extended model and how their coordinates follow from q and theta.
+
+    Attributes:
+        bodies: the columns by coordinate.
+        link: (nv, n) part of q in the coordinates.
+        motor: (nv, n) part of theta.
+        offset: (nv,) coordinates at zero.
+        fold: (nv, R) rows by coordinate to rows of the model.
+        states: (nv, n) of each of the S / 3 n groups of states: q, and theta where it moves on its own.
+        groups: (columns of bodies, k) sum over identical rotors, None where there is nothing to sum.
+    """
+
+    bodies: BodyColumns
+    link: FloatArray
+    motor: FloatArray
+    offset: FloatArray
+    fold: FloatArray
+    states: tuple[FloatArray, ...]
+    groups: FloatArray | None
+
+    @staticmethod
+    def of(model: ModelColumns, effect: Effect, which: IntArray) -> "_BodyMap":
+        robot = model.robot
+        groups = None
+        if isinstance(effect, RigidBodies) and not model.elastic and not model.separate:
             # theta = q and no rotor among the columns: the links alone are enough
             take = np.array([robot.extended_model.joints[int(k)].idx_v for k in robot.body_indices])
-            model, link, motor, offset = robot.model, robot.link_map[take], None, robot.offset[take]
-            bodies = BodyColumns.of(model, which)
+            bodies = BodyColumns.of(robot.model, which)
+            link, offset = robot.link_map[take], robot.offset[take]
+            motor = np.zeros_like(link)
         else:
-            model, link, motor, offset = robot.extended_model, robot.link_map, robot.motor_map, robot.offset
-            bodies = BodyColumns.of(model, self._extended_columns(effect, which))
-        theta = (motion.q, motion.dq, motion.ddq)
-        if self.elastic:
-            theta = (motion.theta, motion.dtheta, motion.ddtheta)
+            link, motor, offset = robot.link_map, robot.motor_map, robot.offset
+            parameters = 10 * (robot.rotor_indices - 1) + 9
+            if isinstance(effect, RigidBodies):
+                parameters = 10 * (robot.body_indices[which // 10] - 1) + which % 10
+            else:
+                names = robot.rotor_groups
+                of = np.array([names.index(f"{rotor.rotor_group}.rotor_inertia") for rotor in robot.rotors])
+                groups = (of[:, None] == which[None, :]).astype(np.float64)
+            bodies = BodyColumns.of(robot.extended_model, parameters)
+        fold = np.concatenate([link, motor], axis=1) if model.separate else link + motor
+        states = (link, motor) if model.elastic else (link + motor,)
+        return _BodyMap(bodies, link, motor, offset, fold, states, groups)
 
-        def at(link_part: FloatArray, motor_part: FloatArray) -> FloatArray:
-            whole: FloatArray = link_part @ link.T
-            return whole if motor is None else whole + motor_part @ motor.T
+    def at(self, motion: Motion) -> "_BodyPart":
+        def coordinates(q: FloatArray, theta: FloatArray) -> FloatArray:
+            whole: FloatArray = self.link @ q.T + self.motor @ theta.T
+            return whole
 
-        column, slope = bodies.evaluate(
-            at(motion.q, theta[0]) + offset, at(motion.dq, theta[1]), at(motion.ddq, theta[2]), derivatives=derivatives
+        return _BodyPart(
+            self,
+            self.bodies.at(
+                coordinates(motion.q, motion.theta) + self.offset[:, None],
+                coordinates(motion.dq, motion.dtheta),
+                coordinates(motion.ddq, motion.ddtheta),
+            ),
         )
-        if isinstance(effect, RotorInertia):
-            groups = self._groups(which)
-            column = column @ groups
-            slope = np.moveaxis(np.moveaxis(slope, 2, 3) @ groups, 3, 2)
-        return self._fold(column, link, motor), self._fold_states(self._fold(slope, link, motor), link, motor)
 
-    def _extended_columns(self, effect: Effect, which: IntArray) -> IntArray:
-        robot = self.robot
-        if isinstance(effect, RigidBodies):
-            return 10 * (robot.body_indices[which // 10] - 1) + which % 10
-        return 10 * (robot.rotor_indices - 1) + 9
 
-    def _groups(self, which: IntArray) -> FloatArray:
-        """(rotors, chosen groups) membership."""
-        names = self.robot.rotor_groups
-        of = [names.index(f"{rotor.rotor_group}.rotor_inertia") for rotor in self.robot.rotors]
-        membership: FloatArray = (np.array(of)[:, None] == which[None, :]).astype(np.float64)
-        return membership
+@dataclass(frozen=True, eq=False)
+class _BodyPart:
+    map: _BodyMap
+    motion: BodyMotion
 
-    def _fold(self, rows: FloatArray, link: FloatArray, motor: FloatArray | None) -> FloatArray:
-        """From rows of coordinates (N, nv, ...) to sums or link and motor rows."""
-        motor_part = np.zeros_like(link) if motor is None else motor
-        take = np.concatenate([link, motor_part], axis=1) if self.separate else link + motor_part
-        return _contract(rows, take, 1)
+    def columns(self) -> FloatArray:
+        columns = _contract(self.motion.columns(), self.map.fold, 0)
+        return columns if self.map.groups is None else _contract(columns, self.map.groups, 1)
 
-    def _fold_states(self, slopes: FloatArray, link: FloatArray, motor: FloatArray | None) -> FloatArray:
-        """From derivatives by coordinates (..., 3 nv) to derivatives by q (and theta)."""
-        if not slopes.shape[-1]:
+    def pull(self, lever: FloatArray) -> FloatArray:
+        by_body = lever if self.map.groups is None else _contract(lever, self.map.groups.T, 1)
+        by_coordinate = self.motion.pull(_contract(by_body, self.map.fold.T, 0))
+        nv = len(self.map.fold)
+        return np.concatenate(
+            [states.T @ by_coordinate[k * nv : (k + 1) * nv] for states in self.map.states for k in range(3)]
+        )
+
+    def slopes(self, stride: int) -> FloatArray:
+        slopes = _contract(self.motion.slopes(stride), self.map.fold, 1)
+        if self.map.groups is not None:
+            slopes = _contract(slopes, self.map.groups, 2)
+        nv = len(self.map.fold)
+        if len(self.map.states) == 1 and _is_identity(self.map.states[0]):
             return slopes
-        nv = link.shape[0]
-        parts = [slopes[..., k * nv : (k + 1) * nv] for k in range(3)]
-        if self.elastic:
-            assert motor is not None
-            folded = [part @ link for part in parts] + [part @ motor for part in parts]
-        else:
-            both = link if motor is None else link + motor
-            if nv == both.shape[1] and np.array_equal(both, np.eye(nv)):
-                return slopes
-            folded = [part @ both for part in parts]
-        return np.concatenate(folded, axis=-1)
+        return np.concatenate(
+            [slopes[..., k * nv : (k + 1) * nv] @ states for states in self.map.states for k in range(3)], axis=-1
+        )
 
-    # -- effects at one joint --------------------------------------------------------------------------------------
 
-    def _joint(
-        self,
-        effect: JointEffect,
-        which: IntArray,
-        here: IntArray,
-        motion: Motion,
-        columns: FloatArray,
-        slopes: FloatArray,
-        derivatives: bool,
-    ) -> None:
-        n, i = self.robot.n, self.robot.index(effect.required_joint)
-        theta, dtheta = (motion.theta, motion.dtheta) if self.elastic else (motion.q, motion.dq)
-        state = (motion.q[:, i], motion.dq[:, i], theta[:, i], dtheta[:, i])
-        value = effect.local_columns(*state)[:, which]
-        on_link = {Side.LINK: 1.0, Side.SPRING: -1.0}.get(effect.side, 0.0)
-        on_motor = {Side.MOTOR: 1.0, Side.SPRING: 1.0}.get(effect.side, 0.0)
-        signs = [(i, on_link), (n + i, on_motor)] if self.separate else [(i, on_link + on_motor)]
-        for row, sign in signs:
-            columns[:, row, here] = sign * value
-        if not derivatives:
-            return
-        places = (i, n + i, 3 * n + i, 4 * n + i) if self.elastic else (i, n + i, i, n + i)
-        for place, part in zip(places, local_slopes(effect, *state), strict=True):
-            if part is None:
-                continue
-            for row, sign in signs:
-                slopes[:, row, here, place] += sign * part[:, which]
+@dataclass(frozen=True, eq=False)
+class _JointPart:
+    """An effect at one joint: its columns depend on q, q', theta and theta' of that joint."""
 
-    # -- any other effect ------------------------------------------------------------------------------------------
+    model: ModelColumns
+    effect: JointEffect
+    which: IntArray
+    motion: Motion
 
-    def _rows(self, effect: Effect, motion: Motion) -> FloatArray:
-        whole = motion if self.elastic else Motion.rigid(motion.time, motion.q, motion.dq, motion.ddq)
-        part = effect.evaluate(State(self.robot, whole))
-        rows: FloatArray = np.concatenate([part.link, part.motor], axis=1) if self.separate else part.link + part.motor
-        return rows
+    @cached_property
+    def _index(self) -> int:
+        return self.model.robot.index(self.effect.required_joint)
 
-    def _differences(self, effect: Effect, which: IntArray, motion: Motion) -> FloatArray:
-        """Central differences, for effects that say nothing about their derivatives."""
-        n = self.robot.n
-        names = STATES if self.elastic else STATES[:3]
-        parts = []
-        step = 1e-6
-        for name in names:
+    @cached_property
+    def _signs(self) -> list[tuple[int, float]]:
+        """Rows at which it acts, with sign."""
+        on_link = {Side.LINK: 1.0, Side.SPRING: -1.0}.get(self.effect.side, 0.0)
+        on_motor = {Side.MOTOR: 1.0, Side.SPRING: 1.0}.get(self.effect.side, 0.0)
+        n, i = self.model.robot.n, self._index
+        return [(i, on_link), (n + i, on_motor)] if self.model.separate else [(i, on_link + on_motor)]
+
+    @cached_property
+    def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        motion, i = self.motion, self._index
+        return motion.q[:, i], motion.dq[:, i], motion.theta[:, i], motion.dtheta[:, i]
+
+    @cached_property
+    def _slopes(self) -> list[tuple[int, FloatArray]]:
+        """State and (N, k) derivative by it."""
+        n, i = self.model.robot.n, self._index
+        places = (i, n + i, 3 * n + i, 4 * n + i) if self.model.elastic else (i, n + i, i, n + i)
+        parts = local_slopes(self.effect, *self._state)
+        return [(place, part[:, self.which]) for place, part in zip(places, parts, strict=True) if part is not None]
+
+    def columns(self) -> FloatArray:
+        value = self.effect.local_columns(*self._state)[:, self.which].T
+        columns = np.zeros((self.model.rows, *value.shape))
+        for row, sign in self._signs:
+            columns[row] = sign * value
+        return columns
+
+    def pull(self, lever: FloatArray) -> FloatArray:
+        gradient = np.zeros((self.model.states, len(self.motion)))
+        for place, part in self._slopes:
+            for row, sign in self._signs:
+                gradient[place] += sign * (lever[row] * part.T).sum(axis=0)
+        return gradient
+
+    def slopes(self, stride: int) -> FloatArray:
+        samples = len(range(0, len(self.motion), stride))
+        slopes = np.zeros((samples, self.model.rows, len(self.which), self.model.states))
+        for place, part in self._slopes:
+            for row, sign in self._signs:
+                slopes[:, row, :, place] += sign * part[::stride]
+        return slopes
+
+
+@dataclass(frozen=True, eq=False)
+class _OtherPart:
+    """Any other effect: it says nothing about its derivatives, so that they are central differences."""
+
+    model: ModelColumns
+    effect: Effect
+    which: IntArray
+    motion: Motion
+
+    _STEP = 1e-6
+
+    def _rows(self, motion: Motion) -> FloatArray:
+        """(N, R, k)."""
+        part = self.effect.evaluate(State(self.model.robot, motion))
+        rows = np.concatenate([part.link, part.motor], axis=1) if self.model.separate else part.link + part.motor
+        chosen: FloatArray = rows[:, :, self.which]
+        return chosen
+
+    @cached_property
+    def _differences(self) -> FloatArray:
+        """(N, R, k, S)."""
+        n, parts = self.model.robot.n, []
+        for name in STATES if self.model.elastic else STATES[:3]:
+            partner = {"q": "theta", "dq": "dtheta", "ddq": "ddtheta"}.get(name)
+            names = [name] if self.model.elastic or partner is None else [name, partner]
             for i in range(n):
-                shift = np.zeros(n)
-                shift[i] = step
-                there, back = (
-                    self._rows(effect, replace(motion, **{name: getattr(motion, name) + sign * shift}))[:, :, which]
-                    for sign in (1.0, -1.0)
-                )
-                parts.append((there - back) / (2.0 * step))
+                there, back = (self._rows(_moved(self.motion, names, i, sign * self._STEP)) for sign in (1.0, -1.0))
+                parts.append((there - back) / (2.0 * self._STEP))
         return np.stack(parts, axis=-1)
+
+    def columns(self) -> FloatArray:
+        return self._rows(self.motion).transpose(1, 2, 0)
+
+    def pull(self, lever: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("rpn,nrps->sn", lever, self._differences, optimize=True), dtype=np.float64)
+
+    def slopes(self, stride: int) -> FloatArray:
+        return self._differences[::stride]
+
+
+def _moved(motion: Motion, names: Sequence[str], joint: int, step: float) -> Motion:
+    changed = {}
+    for name in names:
+        values = getattr(motion, name).copy()
+        values[:, joint] += step
+        changed[name] = values
+    return replace(motion, **changed)
+
+
+def _is_identity(matrix: FloatArray) -> bool:
+    return matrix.shape[0] == matrix.shape[1] and np.array_equal(matrix, np.eye(len(matrix)))
 
 
 def _contract(values: FloatArray, matrix: FloatArray, axis: int) -> FloatArray:
-    """Product of one axis (length of the rows of the matrix) with a matrix."""
-    if matrix.shape[0] == matrix.shape[1] and np.array_equal(matrix, np.eye(len(matrix))):
+    """Product of one axis with the rows of a matrix."""
+    if _is_identity(matrix):
         return values
     return np.moveaxis(np.tensordot(values, matrix, axes=(axis, 0)), -1, axis)
-
-
-def local_slopes(
-    effect: JointEffect, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray
-) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None, FloatArray | None]:
-    """(N, k) derivatives of the columns of an effect by q, q', theta and theta'; None where there is none.
-
-    Known effects are differentiated by hand, others by a difference of fourth order in the state of their joint.
-    """
-    one = np.ones((len(q), 1))
-    if isinstance(effect, ViscousFriction):
-        return None, None, None, one
-    if isinstance(effect, CoulombFriction):
-        return None, None, None, _sign_slope(dtheta, effect.smoothing)
-    if isinstance(effect, LinkFriction):
-        return None, np.concatenate([one, _sign_slope(dq, effect.smoothing)], axis=1), None, None
-    if isinstance(effect, SpringStiffness):
-        return -one, None, one, None
-    if isinstance(effect, SpringDamping):
-        return None, -one, None, one
-    state = [q, dq, theta, dtheta]
-    parts: list[FloatArray | None] = []
-    step = 1e-5
-    for k in range(4):
-
-        def moved(steps: int, k: int = k) -> FloatArray:
-            there = list(state)
-            there[k] = state[k] + steps * step
-            return effect.local_columns(*there)
-
-        parts.append((8.0 * (moved(1) - moved(-1)) - (moved(2) - moved(-2))) / (12.0 * step))
-    return parts[0], parts[1], parts[2], parts[3]
-
-
-def _sign_slope(velocity: FloatArray, smoothing: float) -> FloatArray:
-    return ((1.0 - np.tanh(velocity / smoothing) ** 2) / smoothing)[:, None]

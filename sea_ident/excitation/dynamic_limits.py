@@ -12,7 +12,7 @@ from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.bodies import BodyColumns
-from sea_ident.excitation.columns import local_slopes
+from sea_ident.excitation.local_slopes import local_slopes
 from sea_ident.motion import Motion
 from sea_ident.robot import Limits, Robot
 
@@ -77,14 +77,12 @@ class DynamicLimits:
         """
         robot, n = self.robot, self.robot.n
         both = robot.link_map + robot.motor_map
-        column, slope = self._bodies.evaluate(
-            motion.q @ both.T + robot.offset, motion.dq @ both.T, motion.ddq @ both.T, derivatives=derivatives
-        )
-        torque = column[:, :, 0] @ self._fold
+        bodies = self._bodies.at(both @ motion.q.T + robot.offset[:, None], both @ motion.dq.T, both @ motion.ddq.T)
+        torque = bodies.columns()[:, 0].T @ self._fold
         slopes = np.zeros((len(motion), len(self), 3 * n if derivatives else 0))
         if derivatives:
             nv = both.shape[0]
-            folded = np.swapaxes(slope[:, :, 0], 1, 2) @ self._fold  # (N, 3 nv, r)
+            folded = np.swapaxes(bodies.slopes()[:, :, 0], 1, 2) @ self._fold  # (N, 3 nv, r)
             for k in range(3):
                 slopes[:, :, k * n : (k + 1) * n] = np.swapaxes(both.T @ folded[:, k * nv : (k + 1) * nv], 1, 2)
         for friction in self.friction:

@@ -1,18 +1,21 @@
 """The information matrix of a Fourier series and its derivatives with respect to the coefficients."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.excitation.columns import ModelColumns
+from sea_ident.excitation.columns import ColumnMotion, ModelColumns
 from sea_ident.motion import FourierSeries, Motion, fourier_basis
 
 SingleArray: TypeAlias = NDArray[np.float32]
-# Numbers held at once while derivatives are contracted (float32).
+# Numbers held at once while derivatives are contracted (single precision).
 _CHUNK = 6_000_000
+# Samples per harmonic that the curvature is taken from: it only shapes the step.
+_CURVATURE_SAMPLES = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,35 +40,12 @@ class Information:
     weights: FloatArray
     collected: FloatArray
 
-    @property
+    @cached_property
     def time(self) -> FloatArray:
         """(N,) [s]."""
         return np.arange(self.samples, dtype=np.float64) / (self.samples * self.base_frequency)
 
-    def motion(self, coefficients: FloatArray) -> Motion:
-        """The motion of (n, 2 L + 1) coefficients."""
-        return FourierSeries.from_coefficients(coefficients, self.base_frequency).motion(self.time)
-
-    def matrix(self, coefficients: FloatArray) -> FloatArray:
-        """(p, p) information matrix."""
-        phi = self.columns.evaluate(self.motion(coefficients), derivatives=False).columns * self.weights[:, None]
-        flat = phi.reshape(-1, phi.shape[2])
-        matrix: FloatArray = self.gain * (flat.T @ flat) + self.collected
-        return matrix
-
-    def model(self, coefficients: FloatArray) -> "LocalModel":
-        """Columns, derivatives and information matrix at a point."""
-        found = self.columns.evaluate(self.motion(coefficients))
-        root = np.sqrt(self.gain) * self.weights
-        phi = found.columns * root[:, None]
-        slopes = found.slopes * root[:, None, None]
-        flat = phi.reshape(-1, phi.shape[2])
-        return LocalModel(self, phi, slopes, flat.T @ flat + self.collected)
-
-    def eigenvalues(self, coefficients: FloatArray) -> FloatArray:
-        """(p,) eigenvalues of the information matrix, ascending."""
-        return np.asarray(np.linalg.eigvalsh(self.matrix(coefficients)), dtype=np.float64)
-
+    @cached_property
     def bases(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(N, 2 L + 1) bases of position, velocity and acceleration."""
         first, second, third = (
@@ -73,22 +53,52 @@ class Information:
         )
         return first, second, third
 
+    def motion(self, coefficients: FloatArray) -> Motion:
+        """The motion of (n, 2 L + 1) coefficients."""
+        q, dq, ddq = (basis @ coefficients.T for basis in self.bases)
+        return Motion.rigid(self.time, q, dq, ddq)
+
+    def series(self, coefficients: FloatArray) -> FourierSeries:
+        """The series of (n, 2 L + 1) coefficients."""
+        return FourierSeries.from_coefficients(coefficients, self.base_frequency)
+
+    def model(self, coefficients: FloatArray) -> "LocalModel":
+        """Columns, information matrix and derivatives at a point."""
+        there = self.columns.at(self.motion(coefficients))
+        phi = there.columns() * (np.sqrt(self.gain) * self.weights)[:, None, None]
+        matrix = np.matmul(phi, np.swapaxes(phi, 1, 2)).sum(axis=0) + self.collected
+        return LocalModel(self, there, phi, matrix)
+
+    def matrix(self, coefficients: FloatArray) -> FloatArray:
+        """(p, p) information matrix."""
+        return self.model(coefficients).matrix
+
+    def eigenvalues(self, coefficients: FloatArray) -> FloatArray:
+        """(p,) eigenvalues of the information matrix, ascending."""
+        return np.asarray(np.linalg.eigvalsh(self.matrix(coefficients)), dtype=np.float64)
+
 
 @dataclass(frozen=True, eq=False)
 class LocalModel:
-    """First and second order of a criterion around a point.
+    """The information matrix at a point, and its derivatives when asked for.
 
     Attributes:
         information: what it was computed from.
-        phi: (N, R, p) weighted columns.
-        slopes: (N, R, p, S) their derivatives by the state.
+        columns: the columns there.
+        phi: (R, p, N) weighted columns.
         matrix: (p, p) information matrix.
     """
 
     information: Information
+    columns: ColumnMotion
     phi: FloatArray
-    slopes: FloatArray
     matrix: FloatArray
+
+    @property
+    def _root(self) -> FloatArray:
+        """(R,) weight of each row, with the gain."""
+        root: FloatArray = np.sqrt(self.information.gain) * self.information.weights
+        return root
 
     def gradient(self, derivative: FloatArray) -> FloatArray:
         """Gradient of a function of G.
@@ -99,16 +109,15 @@ class LocalModel:
         Returns:
             (n (2 L + 1),) derivatives with respect to the coefficients.
         """
-        samples, rows, p, states = self.slopes.shape
-        lever = 2.0 * (self.phi @ derivative)
-        by_state = (lever.reshape(samples, 1, rows * p) @ self.slopes.reshape(samples, rows * p, states))[:, 0]
-        n = states // 3
-        parts = [basis.T @ by_state[:, k * n : (k + 1) * n] for k, basis in enumerate(self.information.bases())]
-        gradient: FloatArray = (parts[0] + parts[1] + parts[2]).T.reshape(-1)
+        lever = np.matmul(2.0 * derivative, self.phi) * self._root[:, None, None]
+        by_state = self.columns.pull(lever)
+        n = self.columns.model.robot.n
+        parts = [by_state[k * n : (k + 1) * n] @ basis for k, basis in enumerate(self.information.bases)]
+        gradient: FloatArray = (parts[0] + parts[1] + parts[2]).ravel()
         return gradient
 
     def changes(self, vectors: FloatArray) -> SingleArray:
-        """Change of the information matrix with every coefficient, in another basis.
+        """Change of the information matrix with every coefficient, in another basis, from part of the samples.
 
         Args:
             vectors: (p, p) columns are the basis.
@@ -116,20 +125,21 @@ class LocalModel:
         Returns:
             (n (2 L + 1), p, p) ``V' dG/dc V`` in single precision: it only shapes the step.
         """
-        samples, rows, p, states = self.slopes.shape
+        information = self.information
+        stride = max(1, information.samples // (_CURVATURE_SAMPLES * information.harmonics))
+        slopes = self.columns.slopes(stride) * (stride * self._root)[:, None, None]
+        samples, rows, p, states = slopes.shape
         n = states // 3
-        phi = (self.phi @ vectors).astype(np.float32)
-        bases = [basis.astype(np.float32) for basis in self.information.bases()]
+        phi = np.matmul(vectors.T, self.phi[:, :, ::stride]).transpose(2, 0, 1).astype(np.float32)
+        bases = [basis[::stride].astype(np.float32) for basis in information.bases]
         width = bases[0].shape[1]
         total = np.zeros((width, n * p * p), dtype=np.float32)
         size = max(1, _CHUNK // (states * p * p))
         for start in range(0, samples, size):
             part = slice(start, min(start + size, samples))
-            slopes = self.slopes[part].astype(np.float32)
-            count = slopes.shape[0]
+            turned = np.ascontiguousarray(slopes[part].transpose(0, 3, 2, 1), dtype=np.float32)
             # (N, S p, R) @ (N, R, p)
-            crossed = np.ascontiguousarray(slopes.transpose(0, 3, 2, 1)).reshape(count, states * p, rows) @ phi[part]
-            crossed = crossed.reshape(count, 3, n * p * p)
+            crossed = (turned.reshape(len(turned), states * p, rows) @ phi[part]).reshape(len(turned), 3, n * p * p)
             for k in range(3):
                 total += bases[k][part].T @ crossed[:, k]
         half = total.reshape(width, n, p, p).transpose(1, 0, 2, 3).reshape(n * width, p, p)
