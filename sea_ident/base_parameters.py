@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Column, Effect
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.motion import Motion
-from sea_ident.regressor import build_regressor, model_columns
+from sea_ident.regressor import build_total, model_columns
 from sea_ident.robot import Robot
 
 # A column that lies this close to the span of those kept before it (as a fraction of its length) adds nothing.
@@ -159,7 +159,7 @@ def find_base_parameters(
         motion = random_motion(robot, max(40, 4 * (len(columns) // robot.n + 1)), seed)
     triangle = np.zeros((0, len(columns)))
     for part in motion.chunks(500):
-        rows = build_regressor(robot, effects, part).sum.reshape(-1, len(columns))
+        rows = build_total(robot, effects, part).reshape(-1, len(columns))
         triangle = scipy.linalg.qr(np.vstack([triangle, rows]), mode="r", check_finite=False)[0][: len(columns)]
     return group_columns(columns, triangle, tolerance)
 

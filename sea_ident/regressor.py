@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Column, Contribution, Effect, State, corrected_motion
 from sea_ident.exceptions import SeaIdentError
 from sea_ident.motion import Motion
@@ -84,19 +84,79 @@ def build_regressor(
     Raises:
         SeaIdentError: if the motion does not fit the robot.
     """
-    if motion.n != robot.n:
-        raise SeaIdentError(f"the motion has {motion.n} joints, {robot.name} has {robot.n}")
+    _check_joints(robot, motion)
     state = State(robot, corrected_motion(robot, effects, motion), channels)
     columns = model_columns(robot, effects)
-    parts = [effect.evaluate(state) for effect in effects]
-    empty = np.zeros((len(motion), robot.n, 0))
-    rows = Contribution(
-        np.concatenate([empty, *(part.link for part in parts)], axis=2),
-        np.concatenate([empty, *(part.motor for part in parts)], axis=2),
-    )
+    link, motor = np.zeros((2, len(motion), robot.n, len(columns)))
+    for place, part in _parts(effects, state):
+        link[:, :, place] = part.link
+        if not _is_nothing(part.motor):
+            motor[:, :, place] = part.motor
+    rows = Contribution(link, motor)
     for effect in effects:
         rows = effect.shifted(robot, motion.time, rows)
     return Regressor(columns, rows.link, rows.motor)
+
+
+def build_total(
+    robot: Robot,
+    effects: Sequence[Effect],
+    motion: Motion,
+    channels: Mapping[str, FloatArray] | None = None,
+    columns: IntArray | None = None,
+) -> FloatArray:
+    """Build the sum of link and motor rows alone (paper, eq. 4), in a third of the memory and time.
+
+    Args:
+        robot: the robot.
+        effects: the model.
+        motion: (N, n) motion.
+        channels: further measured signals (N, n) by kind, for effects that need them.
+        columns: indices of the columns to be kept, rising; all by default.
+
+    Returns:
+        (N, n, k) rows: ``total @ psi = tau_motor``.
+
+    Raises:
+        SeaIdentError: if the motion does not fit the robot.
+    """
+    _check_joints(robot, motion)
+    state = State(robot, corrected_motion(robot, effects, motion), channels)
+    kept = np.arange(len(model_columns(robot, effects))) if columns is None else columns
+    total = np.zeros((len(motion), robot.n, len(kept)))
+    for place, part in _parts(effects, state):
+        first, last = np.searchsorted(kept, (place.start, place.stop))
+        if first == last:
+            continue
+        inside = kept[first:last] - place.start
+        take: IntArray | slice = slice(None) if len(inside) == place.stop - place.start else inside
+        total[:, :, first:last] = part.link[:, :, take]
+        if not _is_nothing(part.motor):
+            total[:, :, first:last] += part.motor[:, :, take]
+    rows = Contribution(total, np.broadcast_to(0.0, total.shape))
+    for effect in effects:
+        rows = effect.shifted(robot, motion.time, rows)
+    return rows.link if _is_nothing(rows.motor) else rows.link + rows.motor
+
+
+def _parts(effects: Sequence[Effect], state: State) -> Iterator[tuple[slice, Contribution]]:
+    """Columns of every effect and where they belong."""
+    start = 0
+    for effect in effects:
+        part = effect.evaluate(state)
+        stop = start + part.link.shape[2]
+        yield slice(start, stop), part
+        start = stop
+
+
+def _is_nothing(rows: FloatArray) -> bool:
+    """Whether rows are one zero that is repeated without taking memory."""
+    return rows.size > 0 and not any(rows.strides) and rows.flat[0] == 0.0
+
+
+def _check_joints(robot: Robot, motion: Motion) -> None:
+    if motion.n != robot.n:
+        raise SeaIdentError(f"the motion has {motion.n} joints, {robot.name} has {robot.n}")
 
 
 def regressor_chunks(robot: Robot, effects: Sequence[Effect], motion: Motion, size: int = 1000) -> Iterator[Regressor]:

@@ -12,7 +12,7 @@ from sea_ident.effects.rigid_bodies import RigidBodies
 from sea_ident.effects.rotor_inertia import RotorInertia
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.motion import Motion
-from sea_ident.regressor import build_regressor, inverse_dynamics, prior_parameters, regressor_chunks
+from sea_ident.regressor import build_regressor, build_total, inverse_dynamics, prior_parameters, regressor_chunks
 from sea_ident.robot import Robot, load_robot
 
 BAXTER = "example:baxter_description/urdf/baxter.urdf"
@@ -138,6 +138,19 @@ def test_chunks_are_the_whole_in_parts() -> None:
     parts = list(regressor_chunks(robot, effects, motion, size=10))
     assert [len(part.link) for part in parts] == [10, 10, 5]
     np.testing.assert_array_equal(np.concatenate([part.sum for part in parts]), whole.sum)
+
+
+@pytest.mark.parametrize("name", ["exo_leg", "panda (mimic finger)", "baxter arm, tilted rotors"])
+def test_total_is_the_sum_of_both_rows_in_any_columns(name: str) -> None:
+    robot = robot_of(name)
+    links = tuple(make_effect("link_friction", j.name) for j in robot.joints if j.elastic)
+    effects = (*base_effects(robot), *links)
+    motion = random_motion(robot, 8, seed=8)
+    whole = build_regressor(robot, effects, motion).sum
+    np.testing.assert_allclose(build_total(robot, effects, motion), whole, rtol=1e-14)
+    columns = np.sort(np.random.default_rng(0).permutation(whole.shape[2])[: whole.shape[2] // 2])
+    some = build_total(robot, effects, motion, columns=columns)
+    np.testing.assert_allclose(some, whole[:, :, columns], rtol=1e-14)
 
 
 def test_two_columns_of_one_name_are_refused() -> None:

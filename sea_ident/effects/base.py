@@ -26,6 +26,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
+from sea_ident.robot.rotor_columns import rotor_columns
 
 
 class Side(StrEnum):
@@ -115,35 +116,38 @@ class State:
     channels: Mapping[str, FloatArray] | None = None
 
     @cached_property
-    def extended_regressor(self) -> FloatArray:
-        """(N, nv, 10 bodies) regressor of links and rotors as bodies of one tree."""
+    def body_regressor(self) -> FloatArray:
+        """(N, n, 10 b) link rows of the standard inertial parameters of the links; in motor rows they are not."""
         robot, motion = self.robot, self.motion
-        model = robot.extended_model
-        data = model.createData()
-        x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
-        v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
-        a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))
+        model, data = robot.model, robot.model.createData()
+        rows = [robot.extended_model.joints[int(k)].idx_v for k in robot.body_indices]
+        link_map = robot.link_map[rows]
+        x = np.ascontiguousarray(motion.q @ link_map.T + robot.offset[rows])
+        v, a = np.ascontiguousarray(motion.dq @ link_map.T), np.ascontiguousarray(motion.ddq @ link_map.T)
         out = np.empty((len(motion), model.nv, 10 * (model.njoints - 1)))
         compute = pin.computeJointTorqueRegressor
         for k in range(len(motion)):
             out[k] = compute(model, data, x[k], v[k], a[k])
-        return out
+        if link_map.shape[0] == link_map.shape[1] and np.array_equal(link_map, np.eye(robot.n)):
+            return out
+        return np.asarray(np.matmul(link_map.T, out), dtype=np.float64)
+
+    @cached_property
+    def rotor_rows(self) -> Contribution:
+        """Link and motor rows (N, n, rotors) of the rotor inertias."""
+        return Contribution(*rotor_columns(self.robot, self.motion))
+
+    def body_columns(self, columns: FloatArray) -> Contribution:
+        """Rows of (N, n, k) columns of bodies, which act on links alone."""
+        return Contribution(columns, np.broadcast_to(0.0, columns.shape))
 
     def body_rows(self, inertial: FloatArray) -> Contribution:
         """Link and motor rows (N, n, 1) of the links with the standard inertial parameters (10 b,)."""
-        take = (10 * (self.robot.body_indices - 1)[:, None] + range(10)).ravel()
-        return self.rows((self.extended_regressor[:, :, take] @ inertial)[:, :, None])
+        return self.body_columns((self.body_regressor @ inertial)[:, :, None])
 
     def body_torque(self, inertial: FloatArray) -> FloatArray:
         """(N, n) torque that the links with these standard inertial parameters (10 b,) need [N m]."""
         return self.body_rows(inertial).link[:, :, 0]
-
-    def rows(self, extended: FloatArray) -> Contribution:
-        """Link and motor rows of (N, nv, k) columns of the extended model."""
-        return Contribution(
-            np.matmul(self.robot.link_map.T, extended),
-            np.matmul(self.robot.motor_map.T, extended),
-        )
 
     def at(self, side: Side, joint: str, columns: FloatArray) -> Contribution:
         """Rows of columns (N, k) that act at one joint, at its motor, its link or in its spring."""

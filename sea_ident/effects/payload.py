@@ -38,8 +38,8 @@ class Payload(Effect):
 
     def evaluate(self, state: State) -> Contribution:
         """Rows of the link that carries it."""
-        take = 10 * (int(state.robot.body_indices[self._index(state.robot)]) - 1)
-        return state.rows(state.extended_regressor[:, :, take : take + 10])
+        take = 10 * self._index(state.robot)
+        return state.body_columns(state.body_regressor[:, :, take : take + 10])
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""

@@ -37,10 +37,8 @@ class RigidBodies(Effect):
         )
 
     def evaluate(self, state: State) -> Contribution:
-        """Rows of the links as bodies of the extended model."""
-        bodies = state.robot.body_indices
-        take = (10 * (bodies - 1)[:, None] + range(10)).ravel()
-        return state.rows(state.extended_regressor[:, :, take])
+        """Rows of the links."""
+        return state.body_columns(state.body_regressor)
 
     def prior(self, robot: Robot) -> FloatArray:
         """The URDF's own inertials."""

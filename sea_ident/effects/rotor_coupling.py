@@ -42,9 +42,8 @@ class RotorCoupling(Effect):
         """Rows of the rotor as a body, without the part that its own acceleration gives."""
         robot = state.robot
         k, i = self._rotor(robot), robot.index(str(self.joint))
-        take = 10 * (int(robot.rotor_indices[k]) - 1) + 9
-        rows = state.rows(state.extended_regressor[:, :, take : take + 1])
-        motor, link = rows.motor.copy(), rows.link
+        rows = state.rotor_rows
+        motor, link = rows.motor[:, :, k : k + 1].copy(), rows.link[:, :, k : k + 1]
         spin = robot.motor_map[robot.extended_model.joints[int(robot.rotor_indices[k])].idx_v, i]
         motor[:, i, 0] -= spin**2 * state.motion.ddtheta[:, i]
         return Contribution(link, motor)

@@ -34,10 +34,9 @@ class RotorInertia(Effect):
         )
 
     def evaluate(self, state: State) -> Contribution:
-        """Rows of the rotors as bodies of the extended model, summed over each group."""
-        robot = state.robot
-        take = 10 * (robot.rotor_indices - 1) + 9
-        return state.rows(state.extended_regressor[:, :, take] @ self._membership(robot))
+        """Rows of the rotors, summed over each group."""
+        rows, membership = state.rotor_rows, self._membership(state.robot)
+        return Contribution(rows.link @ membership, rows.motor @ membership)
 
     def prior(self, robot: Robot) -> FloatArray:
         """Data-sheet values."""
