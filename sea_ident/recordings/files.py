@@ -8,10 +8,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sea_ident.exceptions import RecordingError, SeaIdentError, SeaIdentWarning
+from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.recordings.alignment import ClockAlignment
 from sea_ident.recordings.assemble import assemble
 from sea_ident.recordings.atomic import atomic_directory, atomic_file
+from sea_ident.recordings.border import errors_of_libraries
 from sea_ident.recordings.columns import ColumnSource, as_source
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import RawTable
@@ -82,7 +83,7 @@ def read_recording(
     path = Path(path)
     sources = None if columns is None else {target: as_source(value) for target, value in columns.items()}
     names = None if sources is None else _names(sources)
-    with _errors_of_libraries(path) as found:
+    with errors_of_libraries(path) as found:
         table = _format(path).read(path, names, memory_limit)
     recording = assemble(table, sources, clocks, str(path))
     if found:
@@ -158,29 +159,3 @@ def _named(path: Path) -> Iterator[None]:
 
 def _unknown_suffix(path: Path) -> str:
     return f"{path}: the suffix {path.suffix!r} is not known; there are {', '.join(SUFFIXES)}"
-
-
-@contextmanager
-def _errors_of_libraries(path: Path) -> Iterator[list[str]]:
-    """Turn whatever a library makes of a damaged file into a RecordingError, and collect its warnings.
-
-    The border is the one place where every exception is caught: the libraries behind the formats promise
-    nothing about which ones a damaged file leads to.
-    """
-    found: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            yield found
-        except SeaIdentError:
-            raise
-        except PermissionError as error:
-            raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
-        except Exception as error:
-            what = " ".join(str(error).split())[:300] or "no further explanation"
-            raise RecordingError(
-                f"{path}: cannot be read as {path.suffix.lower() or 'a ROS 2 bag'}: "
-                f"{type(error).__name__}: {what}. "
-                "The file is damaged, cut off, or of another format than its name says"
-            ) from error
-    found += [f"{path}: {' '.join(str(item.message).split())[:300]}" for item in caught]

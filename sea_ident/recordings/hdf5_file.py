@@ -2,15 +2,34 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from sea_ident.exceptions import MissingExtraError, RecordingError
+from sea_ident.recordings.isolated import read_isolated
 from sea_ident.recordings.naming import SI_UNITS, TIME, dimension_of
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import MOST_COLUMNS, RawTable, check_size, refuse_or_leave_out, table_of_arrays
 
 _DEEPEST_GROUP = 20
+
+
+def require_h5py(purpose: str) -> None:
+    """Look whether h5py is installed, without importing it.
+
+    Args:
+        purpose: What it is needed for.
+
+    Raises:
+        MissingExtraError: it is not.
+    """
+    try:
+        found = find_spec("h5py") is not None
+    except ValueError:
+        found = False
+    if not found:
+        raise MissingExtraError("h5py", "hdf5", purpose)
 
 
 @contextmanager
@@ -22,20 +41,15 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
     Yields:
         The root group.
-
-    Raises:
-        MissingExtraError: h5py is not installed.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise MissingExtraError("h5py", "hdf5", f"{path}: reading HDF5 or MAT version 7.3") from error
+    import h5py
+
     with h5py.File(path, "r") as root:
         yield root
 
 
 def read_hdf5(path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
-    """Read the numeric datasets of an HDF5 file.
+    """Read the numeric datasets of an HDF5 file, in a process of its own.
 
     Links to other files and data stored in other files are not followed.
 
@@ -51,6 +65,12 @@ def read_hdf5(path: Path, names: Collection[str] | None, memory_limit: int) -> R
         RecordingError: not an HDF5 file of numeric datasets, or too large.
         MissingExtraError: h5py is not installed.
     """
+    require_h5py("reading HDF5")
+    return read_isolated("hdf5_file:parse_hdf5", path, memory_limit)
+
+
+def parse_hdf5(path: Path, memory_limit: int) -> RawTable:
+    """As `read_hdf5`, in this process."""
     with open_hdf5(path) as root:
         return read_datasets(root, path, memory_limit, separator="/", matlab=False)
 
@@ -66,10 +86,9 @@ def write_hdf5(recording: Recording, path: Path) -> None:
         MissingExtraError: h5py is not installed.
         RecordingError: a column name cannot name a dataset.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise MissingExtraError("h5py", "hdf5", "writing HDF5") from error
+    require_h5py("writing HDF5")
+    import h5py
+
     for name in recording.columns:
         if "/" in name or name == ".":
             raise RecordingError(f"column {name!r} cannot name an HDF5 dataset; choose another format")

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident.exceptions import RecordingError
-from sea_ident.recordings.hdf5_file import open_hdf5, read_datasets
+from sea_ident.recordings.hdf5_file import open_hdf5, read_datasets, require_h5py
+from sea_ident.recordings.isolated import read_isolated
 from sea_ident.recordings.naming import TIME
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import RawTable, check_size, refuse_or_leave_out, table_of_arrays
@@ -25,7 +26,7 @@ _DEEPEST_STRUCT = 5
 
 
 def read_mat(path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
-    """Read the numeric variables of a MAT file; fields of a structure become `struct.field`.
+    """Read the numeric variables of a MAT file, in a process of its own; fields of a structure become `struct.field`.
 
     Cells, objects and function handles are never interpreted.
 
@@ -41,9 +42,15 @@ def read_mat(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
         RecordingError: not a MAT file of numeric variables, or too large.
         MissingExtraError: a version 7.3 file, and h5py is not installed.
     """
-    with open(path, "rb") as file:
-        start = file.read(_HEADER_BYTES)
-    if start.startswith(b"MATLAB 7.3") or start.startswith(b"\x89HDF"):
+    if _is_hdf5(_start(path)):
+        require_h5py("reading MAT version 7.3")
+    return read_isolated("mat_file:parse_mat", path, memory_limit)
+
+
+def parse_mat(path: Path, memory_limit: int) -> RawTable:
+    """As `read_mat`, in this process."""
+    start = _start(path)
+    if _is_hdf5(start):
         with open_hdf5(path) as root:
             return read_datasets(root, path, memory_limit, separator=".", matlab=True)
     import scipy.io
@@ -95,6 +102,15 @@ def write_mat(recording: Recording, path: Path) -> None:
     variables = {TIME: recording.time, **recording.columns}
     with open(path, "wb") as file:
         scipy.io.savemat(file, variables, do_compression=True, oned_as="column")
+
+
+def _start(path: Path) -> bytes:
+    with open(path, "rb") as file:
+        return file.read(_HEADER_BYTES)
+
+
+def _is_hdf5(start: bytes) -> bool:
+    return start.startswith((b"MATLAB 7.3", b"\x89HDF"))
 
 
 def _flatten(

@@ -15,6 +15,9 @@ SUFFIXES = (".csv", ".npz", ".inner.npz", ".mat", ".plain.mat", ".4.mat", ".73.m
 SUFFIXES += (".bag", ".mcap", ".db3")
 """Formats; inner: damaged inside the archive, whose checksums are right again; plain: not compressed."""
 
+ISOLATED = (".mat", ".plain.mat", ".4.mat", ".73.mat", ".h5")
+"""Formats whose library ends the process on some damaged files, and is therefore run in a process of its own."""
+
 
 def sample_recording(samples: int = 40, seed: int = 0) -> Recording:
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sea_ident.exceptions import RecordingError
-from sea_ident.recordings import ColumnSource, Recording, read_recording, write_recording
+from sea_ident.recordings import ColumnSource, Recording, csv_file, read_recording, write_recording
 
 FINE = "time,q_hip,current_hip\n0,1,2\n0.5e-1,-3.5,4\n0.1,5,6\n"
 
@@ -43,6 +43,12 @@ def test_harmless_variants_read_the_same(read, text):
     assert leg.time.tolist() == [0.0, 0.05, 0.1]
     assert leg.columns["q_hip"].tolist() == [1.0, -3.5, 5.0]
     assert leg.columns["current_hip"].tolist() == [2.0, 4.0, 6.0]
+
+
+def test_clean_files_are_parsed_by_numpy_alone(read, monkeypatch):
+    monkeypatch.setattr(csv_file, "_parse_slowly", None)
+    assert read("\ufeff# made by hand\r\n\r\n" + FINE.replace("\n", "\r\n")).samples == 3
+    assert read(FINE.replace(",2", ",idle").replace("current_hip", "mode"), columns={"q_a": "q_hip"}).samples == 3
 
 
 @pytest.mark.parametrize(

@@ -307,17 +307,36 @@ def test_a_ros1_chunk_that_unpacks_without_end_is_refused(tmp_path, monkeypatch)
         read_recording(path, columns=BOTH, memory_limit=10_000_000)
 
 
-def test_an_mcap_chunk_that_hides_its_size_is_refused(tmp_path):
-    path = next(write_ros2(tmp_path / "bag", MCAP, MODES.STORAGE).glob("*.mcap"))
+def mcap_record(kind, *parts):
+    body = b"".join(parts)
+    return bytes([kind]) + len(body).to_bytes(8, "little") + body
+
+
+def mcap_text(text):
+    return len(text).to_bytes(4, "little") + text
+
+
+@pytest.mark.parametrize(("claimed", "part"), [(1000, "unpacks to more than 1000"), (10**9, "unpacks to 1000000000")])
+def test_an_mcap_chunk_that_unpacks_without_end_is_refused(tmp_path, claimed, part):
+    bomb = zstd.compress(bytes(50_000_000))
+    magic = b"\x89MCAP0\r\n"
+    sizes = bytes(16) + claimed.to_bytes(8, "little") + bytes(4)
+    chunk = mcap_record(6, sizes, mcap_text(b"zstd"), len(bomb).to_bytes(8, "little"), bomb)
+    header = mcap_record(1, mcap_text(b"ros2"), mcap_text(b""))
+    (tmp_path / "x.mcap").write_bytes(magic + header + chunk + mcap_record(2, bytes(20)) + magic)
+    with pytest.raises(RecordingError, match=part):
+        read_recording(tmp_path / "x.mcap", columns=BOTH, memory_limit=10_000_000)
+
+
+def test_an_index_that_does_not_fit_the_chunks_is_refused(tmp_path):
+    path = next(write_ros2(tmp_path / "bag").glob("*.mcap"))
     data = path.read_bytes()
-    start = data.index(b"\x28\xb5\x2f\xfd")
-    room = int.from_bytes(data[start - 8 : start], "little")
-    bomb = zstd.compress(bytes(100_000_000), options={zstd.CompressionParameter.checksum_flag: 0})
-    assert len(bomb) < room + 20_000
-    patched = data[:start] + bomb[:room].ljust(room, b"\0") + data[start + room :]
-    path.write_bytes(patched)
-    with pytest.raises(RecordingError, match=r"unpacks to more|cut off"):
-        read_recording(path, columns=BOTH, memory_limit=10_000_000)
+    offset = (47).to_bytes(8, "little")
+    start = data.index(b"\x06")
+    index = data.rindex(start.to_bytes(8, "little"))
+    path.write_bytes(data[:index] + offset + data[index + 8 :])
+    with pytest.raises(RecordingError, match="index of chunks does not fit"):
+        read_recording(path, columns=BOTH)
 
 
 @pytest.mark.parametrize("storage", [MCAP, SQLITE])
