@@ -89,9 +89,8 @@ def build_regressor(
     columns = model_columns(robot, effects)
     link, motor = np.zeros((2, len(motion), robot.n, len(columns)))
     for place, part in _parts(effects, state):
-        link[:, :, place] = part.link
-        if not _is_nothing(part.motor):
-            motor[:, :, place] = part.motor
+        _add(link, place, part.link, part.joint, slice(None))
+        _add(motor, place, part.motor, part.joint, slice(None))
     rows = Contribution(link, motor)
     for effect in effects:
         rows = effect.shifted(robot, motion.time, rows)
@@ -130,13 +129,12 @@ def build_total(
             continue
         inside = kept[first:last] - place.start
         take: IntArray | slice = slice(None) if len(inside) == place.stop - place.start else inside
-        total[:, :, first:last] = part.link[:, :, take]
-        if not _is_nothing(part.motor):
-            total[:, :, first:last] += part.motor[:, :, take]
-    rows = Contribution(total, np.broadcast_to(0.0, total.shape))
+        for rows in (part.link, part.motor):
+            _add(total, slice(first, last), rows, part.joint, take)
+    whole = Contribution(total, np.broadcast_to(0.0, total.shape))
     for effect in effects:
-        rows = effect.shifted(robot, motion.time, rows)
-    return rows.link if _is_nothing(rows.motor) else rows.link + rows.motor
+        whole = effect.shifted(robot, motion.time, whole)
+    return whole.link if _is_nothing(whole.motor) else whole.link + whole.motor
 
 
 def _parts(effects: Sequence[Effect], state: State) -> Iterator[tuple[slice, Contribution]]:
@@ -147,6 +145,16 @@ def _parts(effects: Sequence[Effect], state: State) -> Iterator[tuple[slice, Con
         stop = start + part.link.shape[2]
         yield slice(start, stop), part
         start = stop
+
+
+def _add(total: FloatArray, place: slice, rows: FloatArray, joint: int | None, take: IntArray | slice) -> None:
+    """Add rows to their columns, touching no more memory than they need."""
+    if _is_nothing(rows):
+        return
+    if joint is None:
+        total[:, :, place] += rows[:, :, take]
+    else:
+        total[:, joint, place] += rows[:, joint, take]
 
 
 def _is_nothing(rows: FloatArray) -> bool:

@@ -95,10 +95,12 @@ class Contribution:
     Attributes:
         link: (N, n, k) part in the link rows.
         motor: (N, n, k) part in the motor rows.
+        joint: index of the joint in whose rows alone it is, None where it is in those of several.
     """
 
     link: FloatArray
     motor: FloatArray
+    joint: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,15 +153,14 @@ class State:
 
     def at(self, side: Side, joint: str, columns: FloatArray) -> Contribution:
         """Rows of columns (N, k) that act at one joint, at its motor, its link or in its spring."""
-        n, index = self.robot.n, self.robot.index(joint)
-        link, motor = (np.zeros((len(self.motion), n, columns.shape[1])) for _ in range(2))
-        if side in (Side.MOTOR, Side.SPRING):
-            motor[:, index] = columns
+        index, shape = self.robot.index(joint), (len(self.motion), self.robot.n, columns.shape[1])
+        rows, nothing = np.zeros(shape), np.broadcast_to(0.0, shape)
+        rows[:, index] = columns
         if side is Side.LINK:
-            link[:, index] = columns
-        elif side is Side.SPRING:
-            link[:, index] = -columns
-        return Contribution(link, motor)
+            return Contribution(rows, nothing, index)
+        if side is Side.SPRING:
+            return Contribution(-rows, rows, index)
+        return Contribution(nothing, rows if side is Side.MOTOR else nothing, index)
 
 
 @dataclass(frozen=True, eq=False)
