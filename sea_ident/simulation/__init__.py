@@ -6,7 +6,7 @@ from sea_ident.simulation.model_plant import ModelPlant, plant_from_model
 from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
 from sea_ident.simulation.result import Simulation
 from sea_ident.simulation.sensors import SensorNoise, WarmUp, motor_current
-from sea_ident.simulation.simulate import Settling, simulate
+from sea_ident.simulation.experiment import Settling, simulate
 
 __all__ = [
     "ComputedTorque",
