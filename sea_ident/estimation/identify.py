@@ -12,7 +12,7 @@ from sea_ident.base_parameters import BaseParameters, find_base_parameters, grou
 from sea_ident.effects import Effect, base_effects
 from sea_ident.effects.base import Side
 from sea_ident.effects.coulomb_friction import CoulombFriction
-from sea_ident.estimation.estimators import Estimate, Estimator, PerSampleWLS
+from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.estimation.solve import condition_number, solve_weighted
@@ -53,7 +53,8 @@ def identify(
         recording: what was measured, as it was read or already processed.
         effects: the model; bodies, rotors, viscous and Coulomb friction of every motor where None. Springs are
             identified in the second step and are not to be given here.
-        estimator: how; the paper's weighting per sample, smoothed, where None.
+        estimator: how; where None, the paper's weighting per sample, smoothed, with instruments from other periods
+            against noise in the regressor where there are at least two periods.
         period: [s], of a recording that is not processed yet; found from the data where None.
         link_harmonics: harmonics of q; chosen from the data where None.
         motor_harmonics: harmonics of theta; chosen from the data where None.
@@ -79,7 +80,7 @@ def identify(
         )
     chosen = default_effects(robot, processed) if effects is None else tuple(effects)
     _refuse_springs(robot, chosen)
-    how = PerSampleWLS() if estimator is None else estimator
+    how = default_estimator(processed) if estimator is None else estimator
     found: list[str] = list(processed.warnings)
     first = len(found)
     base, lost = visible_parameters(robot, chosen, processed)
@@ -96,6 +97,11 @@ def identify(
     for text in found[first:]:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return replace(model, warnings=tuple(dict.fromkeys(found)), notes=(*processed.notes, *estimate.notes))
+
+
+def default_estimator(processed: ProcessedRecording) -> Estimator:
+    """The paper's weighting; with instruments from other periods where there are others."""
+    return InstrumentalVariables() if processed.periods > 1 else PerSampleWLS()
 
 
 def default_effects(robot: Robot, processed: ProcessedRecording) -> tuple[Effect, ...]:

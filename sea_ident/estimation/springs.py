@@ -249,14 +249,12 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         raise IdentificationError(
             f"joint {name!r}: the deflection theta - q is zero throughout; there is no spring in this data"
         )
-    design = columns
+    extra = np.zeros((len(tau), 0))
     if unknown_zero:
         guess = np.linalg.lstsq(columns / scale, tau, rcond=None)[0] / scale
-        design = np.column_stack([columns, -(guess[0] + 3.0 * guess[1] * columns[:, 0] ** 2)])
-    norms = np.linalg.norm(design, axis=0)
-    inverse = np.linalg.pinv(design / norms) / norms[:, None]  # (3 or 4, N)
-    values = inverse @ tau
-    residual = tau - design @ values
+        extra = -(guess[0] + 3.0 * guess[1] * columns[:, :1] ** 2)
+    values, inverse = _solve(data, zero, extra)
+    residual = tau - np.column_stack([columns, extra]) @ values
     law, inverse = values[:3], inverse[:3]
     covariance = _covariance(data, law, inverse, zero, residual)
     freedom = data.uncertainty.degrees_of_freedom
@@ -284,6 +282,40 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         held_out=held_out,
         note=note,
     )
+
+
+def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solve for the law.
+
+    Noise of the deflection, squared, would make the spring look softer. With periods, every product is therefore taken
+    between different periods, whose noises are independent.
+
+    Args:
+        data: the spring.
+        zero: difference of the zeros [rad].
+        extra: (N, 0 or 1) further column, the same in all periods.
+
+    Returns:
+        (c,) values and (c, N) the matrix by which a change of the torque changes them.
+    """
+    design = np.column_stack([_columns(data.motion, data.joint, zero), extra])
+    norms = np.linalg.norm(design, axis=0)
+    if data.per_period is None:
+        inverse = np.linalg.pinv(design / norms) / norms[:, None]
+        return inverse @ data.tau, inverse
+    periods = len(data.per_period)
+    tables = [np.column_stack([_columns(motion, data.joint, zero), extra]) / norms for motion, _ in data.per_period]
+    torques = [tau for _, tau in data.per_period]
+    table, torque = sum(tables) / periods, sum(torques) / periods
+    own = sum(t.T @ t for t in tables) / periods
+    side = sum(t.T @ tau for t, tau in zip(tables, torques, strict=True)) / periods
+    gram = (periods * table.T @ table - own) / (periods - 1.0)
+    if np.linalg.cond(gram) > 1e12:
+        gram, side = table.T @ table, table.T @ torque
+    else:
+        side = (periods * table.T @ torque - side) / (periods - 1.0)
+    values = np.linalg.solve(gram, side) / norms
+    return values, np.linalg.solve(gram, table.T) / norms[:, None]
 
 
 def _covariance(

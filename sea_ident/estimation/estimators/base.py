@@ -4,14 +4,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from sea_ident._typing import FloatArray
 from sea_ident.estimation.observations import Observations
 from sea_ident.motion import Motion
-
-VARIANCE_FLOOR = 1e-6
-"""Smallest variance of a sample as a share of the mean variance of its joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,31 +53,3 @@ class Estimator(ABC):
         Raises:
             IdentificationError: if the data do not determine them.
         """
-
-
-def floored(variance: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Variances that can be divided by: none below a small share of the joint's mean.
-
-    Args:
-        variance: (N, n).
-
-    Returns:
-        (N, n) positive variances, and warnings. A joint without any scatter gets the smallest scatter of the others;
-        where there is none at all every sample counts alike.
-    """
-    mean = variance.mean(axis=0)
-    warnings = []
-    dead = mean <= 0.0
-    if np.all(dead):
-        return np.ones_like(variance), ("the torque does not scatter between periods: all samples weigh the same",)
-    if np.any(dead):
-        warnings.append("the torque of some joints does not scatter between periods: they weigh as the quietest other")
-        mean = np.where(dead, mean[~dead].min(), mean)
-        variance = np.where(dead, mean, variance)
-    zero = np.count_nonzero(variance <= 0.0)
-    if zero:
-        warnings.append(
-            f"{zero} samples have no scatter between periods; they weigh as if it were {VARIANCE_FLOOR**0.5:g} of the "
-            "joint's usual scatter"
-        )
-    return np.maximum(variance, VARIANCE_FLOOR * mean), tuple(warnings)

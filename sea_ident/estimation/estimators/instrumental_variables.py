@@ -7,13 +7,12 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.estimation.estimators.base import Estimate, Estimator, floored
+from sea_ident.estimation.estimators.base import Estimate, Estimator
+from sea_ident.estimation.estimators.weights import SampleWeights, sample_weights
 from sea_ident.estimation.observations import Observations
-from sea_ident.estimation.solve import solve_weighted
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing.process import SMOOTHING
-from sea_ident.processing.variance import smooth_over_phase
 
 Simulator = Callable[[Observations, FloatArray], Motion]
 """From observations and base parameters (b,) to the motion, without noise, at the samples of the mean period."""
@@ -44,28 +43,15 @@ class InstrumentalVariables(Estimator):
 
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
-        processed = observations.processed
-        variance = processed.raw_tau_variance
-        if processed.periods > 1:
-            variance = smooth_over_phase(variance, processed.interval, self.smoothing)
-        variance, warnings = floored(variance / processed.periods)
-        weights = observations.valid / variance
-        first = solve_weighted(observations.rows, observations.torque, weights)
-        if self.simulator is not None:
-            return self._simulated(observations, weights, first.values, first.log_det, warnings)
-        return self._other_periods(observations, weights, first.log_det, warnings)
+        first = sample_weights(observations, self.smoothing)
+        return (
+            self._other_periods(observations, first) if self.simulator is None else self._simulated(observations, first)
+        )
 
-    def _simulated(
-        self,
-        observations: Observations,
-        weights: FloatArray,
-        values: FloatArray,
-        log_det: float,
-        warnings: tuple[str, ...],
-    ) -> Estimate:
+    def _simulated(self, observations: Observations, first: SampleWeights) -> Estimate:
         if self.simulator is None:
             raise IdentificationError("instrumental variables: no simulator was given")
-        rows, torque = observations.rows, observations.torque
+        rows, torque, weights, values = observations.rows, observations.torque, first.weights, first.solution.values
         count = rows.shape[-1]
         flat = rows.reshape(-1, count)
         moved = np.inf
@@ -90,15 +76,16 @@ class InstrumentalVariables(Estimator):
             inverse=inverse,
             weights=weights,
             covariance=inverse @ meat @ inverse.T,
-            log_det_weighted=log_det,
-            notes=(f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round",),
-            warnings=warnings,
+            log_det_weighted=first.solution.log_det,
+            notes=(
+                *first.notes,
+                f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round",
+            ),
+            warnings=first.warnings,
         )
 
-    def _other_periods(
-        self, observations: Observations, weights: FloatArray, log_det: float, warnings: tuple[str, ...]
-    ) -> Estimate:
-        processed = observations.processed
+    def _other_periods(self, observations: Observations, first: SampleWeights) -> Estimate:
+        processed, weights = observations.processed, first.weights
         periods = processed.periods
         if periods < 2:
             raise IdentificationError(
@@ -123,7 +110,10 @@ class InstrumentalVariables(Estimator):
             inverse=inverse,
             weights=weights,
             covariance=inverse @ meat @ inverse.T,
-            log_det_weighted=log_det,
-            notes=("the instruments of every period are the regressors of the other periods",),
-            warnings=warnings,
+            log_det_weighted=first.solution.log_det,
+            notes=(
+                *first.notes,
+                "the instruments of every period are the regressors of the other periods",
+            ),
+            warnings=first.warnings,
         )

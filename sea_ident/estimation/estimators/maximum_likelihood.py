@@ -7,13 +7,13 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, lsmr
 
 from sea_ident._typing import FloatArray, IntArray
-from sea_ident.estimation.estimators.base import Estimate, Estimator, floored
+from sea_ident.estimation.estimators.base import Estimate, Estimator
+from sea_ident.estimation.estimators.weights import sample_weights
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.solve import solve_weighted
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing.process import SMOOTHING
-from sea_ident.processing.variance import smooth_over_phase
 
 STEP = 1e-6
 """Step of the numerical derivatives of the torque [rad, rad/s, rad/s2]."""
@@ -49,15 +49,11 @@ class MaximumLikelihood(Estimator):
                 f"{processed.source}: maximum likelihood takes the noise of the angles from the scatter between "
                 "periods; it needs a periodic recording with at least two periods"
             )
-        variance, warnings = floored(
-            smooth_over_phase(processed.raw_tau_variance, processed.interval, self.smoothing) / processed.periods
-        )
-        valid = observations.valid
-        weights = valid / variance
+        first = sample_weights(observations, self.smoothing)
+        weights = first.weights
         noise = _MotionNoise.build(observations)
         motion, rows = processed.motion, observations.rows
-        solution = solve_weighted(rows, observations.torque, weights)
-        values = solution.values
+        solution, values = first.solution, first.solution.values
         correction = np.zeros(noise.size)
         for _ in range(self.rounds):
             slopes = _slopes(observations, motion, values)
@@ -91,7 +87,8 @@ class MaximumLikelihood(Estimator):
             covariance=0.5 * (inverse + inverse.T),
             log_det_weighted=solution.log_det,
             motion=motion,
-            warnings=warnings,
+            notes=first.notes,
+            warnings=first.warnings,
         )
 
 

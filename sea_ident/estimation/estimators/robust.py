@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.estimation.estimators.base import Estimate, Estimator, floored
+from sea_ident.estimation.estimators.base import Estimate, Estimator
+from sea_ident.estimation.estimators.weights import floored
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.solve import solve_weighted
 from sea_ident.processing.process import SMOOTHING

@@ -1,0 +1,105 @@
+"""Weights per sample: scatter between periods, and what the model lacks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.solve import Solution, solve_weighted
+from sea_ident.processing.variance import smooth_over_phase
+
+VARIANCE_FLOOR = 1e-6
+"""Smallest variance of a sample as a share of the mean variance of its joint."""
+
+ROUNDS = 5
+"""Rounds in which the rest of the residual is found."""
+
+LEAST_REST = 0.2
+"""A rest below this share of the noise variance is chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampleWeights:
+    """Weights, and the weighted least-squares solution that they give.
+
+    Attributes:
+        weights: (N, n) inverse variances of the mean torque, 0 where the model claims nothing.
+        solution: weighted least squares with them.
+        notes: what adds to the scatter.
+        warnings: what a user should know.
+    """
+
+    weights: FloatArray
+    solution: Solution
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def sample_weights(observations: Observations, smoothing: float) -> SampleWeights:
+    """Weights from the variance of every sample (paper, eq. 20), smoothed over phase.
+
+    The scatter says nothing of what the model lacks. Where the residual is larger than the scatter of the mean, the
+    rest is added to the variance of every sample of that joint.
+
+    Args:
+        observations: the data.
+        smoothing: width of the window [s].
+
+    Returns:
+        The weights.
+
+    Raises:
+        IdentificationError: the data do not determine the parameters.
+    """
+    processed = observations.processed
+    variance = processed.raw_tau_variance
+    if processed.periods > 1:
+        variance = smooth_over_phase(variance, processed.interval, smoothing)
+    variance, warnings = floored(variance / processed.periods)
+    rows, torque, valid = observations.rows, observations.torque, observations.valid
+    count = np.maximum(valid.sum(axis=0) - rows.shape[-1] / rows.shape[1], 1.0)
+    noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1)
+    rest = np.zeros(rows.shape[1])
+    for _ in range(ROUNDS):
+        weights = valid / (variance + rest)
+        solution = solve_weighted(rows, torque, weights)
+        residual = torque - rows @ solution.values
+        excess = (residual**2 * valid).sum(axis=0) / count - noise
+        before, rest = rest, np.where(excess > LEAST_REST * noise, excess, 0.0)
+        if np.allclose(rest, before, rtol=1e-2):
+            break
+    notes = tuple(
+        f"{name}: {r**0.5:.3g} of the residual is beyond the scatter between periods and adds to the weighting"
+        for name, r in zip(observations.robot.joint_names, rest, strict=True)
+        if r > 0.0 and processed.periods > 1
+    )
+    return SampleWeights(weights, solution, notes, warnings)
+
+
+def floored(variance: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Variances that can be divided by: none below a small share of the joint's mean.
+
+    Args:
+        variance: (N, n).
+
+    Returns:
+        (N, n) positive variances, and warnings. A joint without any scatter gets the smallest scatter of the others;
+        where there is none at all every sample counts alike.
+    """
+    mean = variance.mean(axis=0)
+    warnings = []
+    dead = mean <= 0.0
+    if np.all(dead):
+        return np.ones_like(variance), ("the torque does not scatter between periods: all samples weigh the same",)
+    if np.any(dead):
+        warnings.append("the torque of some joints does not scatter between periods: they weigh as the quietest other")
+        mean = np.where(dead, mean[~dead].min(), mean)
+        variance = np.where(dead, mean, variance)
+    zero = np.count_nonzero(variance <= 0.0)
+    if zero:
+        warnings.append(
+            f"{zero} samples have no scatter between periods; they weigh as if it were {VARIANCE_FLOOR**0.5:g} of the "
+            "joint's usual scatter"
+        )
+    return np.maximum(variance, VARIANCE_FLOOR * mean), tuple(warnings)
