@@ -48,11 +48,20 @@ class EffectError(SeaIdentError):
     """An effect is unknown, malformed or does not fit the robot."""
 
 
+class OutputError(SeaIdentError):
+    """A file or folder cannot be written."""
+
+
 class MissingExtraError(SeaIdentError):
     """An optional dependency is not installed."""
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         super().__init__(f"{purpose} needs {package}: pip install 'sea-ident[{extra}]'")
+        self._parts = (package, extra, purpose)
+
+    def __reduce__(self) -> tuple[type["MissingExtraError"], tuple[str, str, str]]:
+        # By default only the message would travel between processes, which is not what the constructor takes.
+        return MissingExtraError, self._parts
 
 
 class SeaIdentWarning(UserWarning):

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from sea_ident._typing import FloatArray
+from sea_ident.atomic import atomic_file
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.processing import ProcessedRecording
-from sea_ident.recordings.atomic import atomic_file
 from sea_ident.report.scene import build_scene
 from sea_ident.robot import Robot
 

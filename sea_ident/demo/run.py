@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sea_ident.atomic import atomic_file
 from sea_ident.demo import pictures
 from sea_ident.demo.gait import gait
 from sea_ident.demo.tables import ParameterRow, PerformanceRow, parameter_table, performance_table, table_text
@@ -14,7 +15,6 @@ from sea_ident.exceptions import SeaIdentError
 from sea_ident.excitation import Excitation, Progress, design_excitation
 from sea_ident.processing import process
 from sea_ident.recordings import write_recording
-from sea_ident.recordings.atomic import atomic_file
 from sea_ident.report import write_report
 from sea_ident.robot import load_robot
 from sea_ident.simulation import ComputedTorque, simulate

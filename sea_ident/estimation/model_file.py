@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.atomic import atomic_file
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import effect_from_dict
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.springs import SpringResult, Verdict
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
-from sea_ident.exceptions import ModelFileError, RecordingError, SeaIdentError
+from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError
 from sea_ident.motion import Motion
-from sea_ident.recordings.atomic import atomic_file
 from sea_ident.regressor import model_columns
 from sea_ident.robot import Robot, robot_from_text
 
@@ -112,7 +112,7 @@ def write_model(model: Model, path: str | Path) -> None:
     try:
         with atomic_file(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
-    except RecordingError as error:
+    except OutputError as error:
         raise ModelFileError(str(error)) from None
 
 

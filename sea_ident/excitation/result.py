@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.exceptions import ExcitationError, RecordingError
+from sea_ident.atomic import atomic_file
+from sea_ident.exceptions import ExcitationError, OutputError
 from sea_ident.motion import FourierSeries
-from sea_ident.recordings.atomic import atomic_file
 
 FORMAT = "sea_ident excitation"
 VERSION = 1
@@ -123,7 +123,7 @@ class Excitation:
         try:
             with atomic_file(path) as temporary:
                 temporary.write_text(text + "\n", encoding="utf-8")
-        except RecordingError as error:
+        except OutputError as error:
             raise ExcitationError(str(error)) from error
 
 

@@ -4,12 +4,12 @@ import warnings as python_warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sea_ident.atomic import atomic_file
 from sea_ident.estimation import Model, physical_parameters
-from sea_ident.exceptions import ExportError, RecordingError, SeaIdentWarning
+from sea_ident.exceptions import ExportError, OutputError, SeaIdentWarning
 from sea_ident.export.mjcf import mjcf_text
 from sea_ident.export.urdf import urdf_text
 from sea_ident.export.values import ExportValues, collect_values
-from sea_ident.recordings.atomic import atomic_file
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _write(path: str | Path, kind: str, text: str, notes: list[str], warnings: l
     try:
         with atomic_file(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    except RecordingError as error:
+    except OutputError as error:
         raise ExportError(str(error)) from None
     for warning in warnings:
         python_warnings.warn(f"{path}: {warning}", SeaIdentWarning, stacklevel=3)

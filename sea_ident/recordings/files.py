@@ -8,10 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from sea_ident.atomic import atomic_directory, atomic_file
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.recordings.alignment import ClockAlignment
 from sea_ident.recordings.assemble import assemble
-from sea_ident.recordings.atomic import atomic_directory, atomic_file
 from sea_ident.recordings.border import errors_of_libraries
 from sea_ident.recordings.columns import ColumnSource, as_source
 from sea_ident.recordings.recording import Recording
@@ -102,8 +102,8 @@ def write_recording(recording: Recording, path: str | Path) -> None:
             suffix a ROS 2 bag is written, a folder with an MCAP file, which must not exist yet.
 
     Raises:
-        RecordingError: the suffix is not known, the format cannot hold the recording, or the file cannot be
-            written.
+        RecordingError: the suffix is not known, or the format cannot hold the recording.
+        OutputError: the file cannot be written.
         MissingExtraError: the format needs a package that is not installed.
     """
     path = Path(path)

@@ -10,9 +10,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import sea_ident
+from sea_ident.atomic import atomic_file
 from sea_ident.estimation import Model
 from sea_ident.excitation import Excitation
-from sea_ident.recordings.atomic import atomic_file
 from sea_ident.report.content import Content
 from sea_ident.report.section import Section
 from sea_ident.report.sections import SECTIONS
@@ -68,7 +68,7 @@ def write_report(
         validations: comparisons with recordings that were not used in the fit.
 
     Raises:
-        RecordingError: the file cannot be written.
+        OutputError: the file cannot be written.
     """
     content = Content(result, excitation, tuple(validations))
     text = render(content)

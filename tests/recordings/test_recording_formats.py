@@ -1,6 +1,7 @@
 """Every format: what is written comes back, nothing is half-written, and the border gives clear errors."""
 
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from damage import sample_recording, write_mat73
 
-from sea_ident.exceptions import MissingExtraError, RecordingError
+from sea_ident.exceptions import MissingExtraError, OutputError, RecordingError
 from sea_ident.recordings import ColumnSource, Recording, read_recording, write_recording
 
 SUFFIXES = [".csv", ".npz", ".mat", ".parquet", ".h5", ".hdf5", ".bag", ".mcap", ".db3", ""]
@@ -58,7 +59,7 @@ def test_a_file_is_replaced_as_a_whole(tmp_path, suffix):
 
 def test_a_bag_folder_that_exists_is_never_touched(tmp_path):
     write_recording(sample_recording(10), tmp_path / "leg")
-    with pytest.raises(RecordingError, match="exists already"):
+    with pytest.raises(OutputError, match="exists already"):
         write_recording(sample_recording(20), tmp_path / "leg")
     assert read_recording(tmp_path / "leg").samples == 10
 
@@ -112,6 +113,13 @@ def test_a_missing_extra_says_what_to_install(tmp_path, monkeypatch, suffix, mod
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
 
 
+def test_a_missing_extra_travels_between_processes():
+    error = MissingExtraError("h5py", "hdf5", "reading HDF5")
+    again = pickle.loads(pickle.dumps(error))
+    assert isinstance(again, MissingExtraError)
+    assert str(again) == str(error)
+
+
 def test_importing_the_package_imports_no_extra():
     program = (
         "import sys, sea_ident.recordings\n"
@@ -132,7 +140,7 @@ def test_paths_that_are_no_recording(tmp_path):
         read_recording(tmp_path / "leg.txt")
     with pytest.raises(RecordingError, match=r"suffix '.xls' is not known"):
         write_recording(sample_recording(), tmp_path / "leg.xls")
-    with pytest.raises(RecordingError, match=r"folder .*nowhere does not exist"):
+    with pytest.raises(OutputError, match=r"folder .*nowhere does not exist"):
         write_recording(sample_recording(), tmp_path / "nowhere" / "leg.csv")
     for suffix in SUFFIXES[:-1]:
         (tmp_path / f"empty{suffix}").touch()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from sea_ident.exceptions import RecordingError
+from sea_ident.exceptions import OutputError
 
 
 @contextmanager
@@ -24,7 +24,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
         Path of the temporary file, which does not exist yet.
 
     Raises:
-        RecordingError: the folder does not exist or cannot be written to, or the disk is full.
+        OutputError: the folder does not exist or cannot be written to, or the disk is full.
     """
     target = Path(path)
     temporary = _sibling(target)
@@ -34,7 +34,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
             os.fsync(written.fileno())
         os.replace(temporary, target)
     except OSError as error:
-        raise RecordingError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -51,23 +51,23 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
         Path of the temporary folder, which does not exist yet and has the name of `path`.
 
     Raises:
-        RecordingError: something stands at `path`, or it cannot be written.
+        OutputError: something stands at `path`, or it cannot be written.
     """
     target = Path(path)
     if target.exists():
-        raise RecordingError(f"{target}: exists already; remove it or choose another name")
+        raise OutputError(f"{target}: exists already; remove it or choose another name")
     temporary = _sibling(target)
     try:
         temporary.mkdir()
         yield temporary / target.name
         os.rename(temporary / target.name, target)
     except OSError as error:
-        raise RecordingError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _sibling(target: Path) -> Path:
     if not target.parent.is_dir():
-        raise RecordingError(f"{target}: the folder {target.parent} does not exist; make it first")
+        raise OutputError(f"{target}: the folder {target.parent} does not exist; make it first")
     return target.with_name(f".{target.stem}.{secrets.token_hex(6)}{target.suffix}")

@@ -2,8 +2,8 @@ import os
 
 import pytest
 
-from sea_ident.exceptions import RecordingError
-from sea_ident.recordings.atomic import atomic_directory, atomic_file
+from sea_ident.atomic import atomic_directory, atomic_file
+from sea_ident.exceptions import OutputError
 
 
 def test_the_temporary_file_itself_becomes_the_file(tmp_path):
@@ -40,11 +40,11 @@ def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path):
 
 def test_errors_of_the_disk_are_errors_of_the_project(tmp_path):
     full = OSError(28, "No space left on device")
-    with pytest.raises(RecordingError, match=r"x.csv: cannot be written: No space left"):
+    with pytest.raises(OutputError, match=r"x.csv: cannot be written: No space left"):
         fail(atomic_file(tmp_path / "x.csv"), "half", full)
-    with pytest.raises(RecordingError, match=r"bag: cannot be written: No space left"):
+    with pytest.raises(OutputError, match=r"bag: cannot be written: No space left"):
         fail(atomic_directory(tmp_path / "bag"), "half", full)
-    with pytest.raises(RecordingError, match="cannot be written"), atomic_file(tmp_path / "x.csv"):
+    with pytest.raises(OutputError, match="cannot be written"), atomic_file(tmp_path / "x.csv"):
         pass
     assert os.listdir(tmp_path) == []
 
@@ -67,6 +67,6 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
         (temporary / "whole").touch()
         assert not path.exists()
     assert os.listdir(path) == ["whole"]
-    with pytest.raises(RecordingError, match="exists already"), atomic_directory(path):
+    with pytest.raises(OutputError, match="exists already"), atomic_directory(path):
         pass
     assert os.listdir(tmp_path) == ["bag"]
