@@ -20,6 +20,11 @@ _HOME = {
     "Simulation": "simulation",
     "ProcessedRecording": "processing",
     "process": "processing",
+    "ClockAlignment": "recordings",
+    "ColumnSource": "recordings",
+    "Recording": "recordings",
+    "read_recording": "recordings",
+    "write_recording": "recordings",
     "Model": "estimation",
     "identify": "estimation",
     "identify_springs": "estimation",
@@ -33,11 +38,14 @@ _HOME = {
 }
 
 __all__ = [
+    "ClockAlignment",
+    "ColumnSource",
     "Excitation",
     "FourierSeries",
     "Model",
     "Motion",
     "ProcessedRecording",
+    "Recording",
     "Robot",
     "SeaIdentError",
     "SeaIdentWarning",
@@ -54,8 +62,10 @@ __all__ = [
     "process",
     "read_excitation",
     "read_model",
+    "read_recording",
     "simulate",
     "validate",
+    "write_recording",
 ]
 
 if TYPE_CHECKING:
@@ -66,6 +76,7 @@ if TYPE_CHECKING:
     from sea_ident.export import export_mjcf, export_urdf
     from sea_ident.motion import FourierSeries, Motion
     from sea_ident.processing import ProcessedRecording, process
+    from sea_ident.recordings import ClockAlignment, ColumnSource, Recording, read_recording, write_recording
     from sea_ident.regressor import build_regressor
     from sea_ident.robot import Robot, load_robot
     from sea_ident.simulation import Simulation, simulate
