@@ -129,8 +129,8 @@ def build_total(
             continue
         inside = kept[first:last] - place.start
         take: IntArray | slice = slice(None) if len(inside) == place.stop - place.start else inside
-        for rows in (part.link, part.motor):
-            _add(total, slice(first, last), rows, part.joint, take)
+        _add(total, slice(first, last), part.link, part.joint, take)
+        _add(total, slice(first, last), part.motor, part.joint, take)
     whole = Contribution(total, np.broadcast_to(0.0, total.shape))
     for effect in effects:
         whole = effect.shifted(robot, motion.time, whole)
