@@ -50,7 +50,7 @@ class ClosedLoop:
         for i in range(n):
             self._map[:, self.motor[i]] += robot.motor_map[:, i]
         self._map_t = np.ascontiguousarray(self._map.T)
-        self._offset = robot.offset
+        self._offset = robot.offset if np.any(robot.offset) else None
         self._model = robot.extended_model
         self._data = robot.extended_model.createData()
 
@@ -72,14 +72,6 @@ class ClosedLoop:
         k1, k3, d = plant.stiffness.tolist(), plant.cubic_stiffness.tolist(), plant.spring_damping.tolist()
         self._numbers = list(zip(range(n), self.motor, kp, kd, k1, k3, d, strict=True))
         self.replace_motor_friction(motor_friction)
-        self._constant_stiffness = np.zeros((size, size))
-        self._constant_damping = np.zeros((size, size))
-        for i in range(n):
-            m = self.motor[i]
-            self._constant_stiffness[m, m] += kp[i]
-            self._constant_damping[m, m] += kd[i]
-            if m != i:
-                self._constant_damping[np.ix_([i, m], [i, m])] += d[i] * np.array([[1.0, -1.0], [-1.0, 1.0]])
         stages = len(method.weights)
         self._stages = stages
         self._hgamma = step * method.gamma
@@ -90,9 +82,32 @@ class ClosedLoop:
         self._weights = method.weights
         self._nodes = [float(node) * step for node in method.nodes]
         self._increments = np.zeros((stages, 2 * size))
+        self._rows = [(row[:size], row[size:]) for row in self._increments]
+        self._right = np.zeros(2 * size)
+        self._rates, self._accelerations = self._right[:size], self._right[size:]
+        stiffness, damping = self._linear_part(kp, kd, k1, d)
+        self._implicit = damping + self._hgamma * stiffness
+        self._sides = np.zeros((size, 2 * size), order="F")
+        self._sides[:, :size] = -self._hgamma * stiffness
+        self._evaluated: FloatArray | None = None
+        self._mass = np.zeros((size, size))
         self.acceleration = np.zeros(size)
         self.tau_motor = [0.0] * n
         self.tau_spring = [0.0] * n
+
+    def _linear_part(
+        self, kp: list[float], kd: list[float], k1: list[float], d: list[float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """(size, size) stiffness and damping of gains and springs."""
+        stiffness, damping = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
+        between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        for i, m in enumerate(self.motor):
+            stiffness[m, m] += kp[i]
+            damping[m, m] += kd[i]
+            if m != i:
+                stiffness[np.ix_([i, m], [i, m])] += k1[i] * between
+                damping[np.ix_([i, m], [i, m])] += d[i] * between
+        return stiffness, damping
 
     def replace_motor_friction(self, motor_friction: Sequence[JointFriction]) -> None:
         """Go on with another friction of the motors."""
@@ -100,9 +115,15 @@ class ClosedLoop:
         sides = zip(self._numbers, self.motor_friction, self.link_friction, strict=True)
         self._joints, self._slopes = [], []
         for (i, m, kp, kd, k1, k3, d), on_motor, on_link in sides:
-            link_torque, link_slope = (None, None) if on_link is None else (on_link.torque, on_link.slope)
-            self._joints.append((i, m, kp, kd, k1, k3, d, on_motor.torque, link_torque))
-            self._slopes.append((i, m, k1, k3, on_motor.slope, link_slope))
+            self._joints.append((i, m, kp, kd, k1, k3, d, on_motor.torque, None if on_link is None else on_link.torque))
+            self._slopes.append((m, on_motor.slope))
+            if on_link is not None:
+                self._slopes.append((i, on_link.slope))
+
+    def _position(self, u: FloatArray) -> FloatArray:
+        """(nv,) position of Pinocchio's model."""
+        x: FloatArray = self._map.dot(u)
+        return x if self._offset is None else x + self._offset
 
     # -- forces ------------------------------------------------------------------------------------------------------
 
@@ -134,7 +155,11 @@ class ClosedLoop:
         """Torques and `acceleration` at a state (2 size,) that was reached by accepted steps."""
         u, w = y[: self.size], y[self.size :]
         self._find_load(time, 0.0, bias, u, w, LOAD_ROUNDS_EXACT)
-        self.acceleration = self._acceleration(time, 0.0, bias, u, w)
+        self._mass, force = self._mass_and_force(time, 0.0, bias, u, w)
+        _, self.acceleration, info = dposv(self._mass, force)
+        if info != 0:
+            raise SimulationError(self._not_positive(u))
+        self._evaluated = y
 
     def check_mass(self, y: FloatArray) -> None:
         """Refuse a state in which the mass matrix is not positive definite.
@@ -143,7 +168,7 @@ class ClosedLoop:
             SimulationError: the message names the joint with the smallest inertia.
         """
         u = y[: self.size]
-        mass = self._map_t @ pin.crba(self._model, self._data, self._map @ u + self._offset) @ self._map
+        mass = self._map_t @ pin.crba(self._model, self._data, self._position(u)) @ self._map
         if dpotrf(mass)[1] != 0:
             raise SimulationError(self._not_positive(u))
 
@@ -172,29 +197,33 @@ class ClosedLoop:
             y: (2 size,) positions and velocities.
         """
         size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
+        rates, accelerations, right = self._rates, self._accelerations, self._right
+        if self._evaluated is not y:
+            self.evaluate(time, biases[0], y)
         u, w = y[:size], y[size:]
-        self._find_load(time, 0.0, biases[0], u, w, LOAD_ROUNDS)
-        mass, force = self._mass_and_force(time, 0.0, biases[0], u, w)
-        stiffness, damping = self._jacobian(time, u, w)
-        stiffness *= hgamma
-        factor, info = dpotrf(mass / hgamma + damping + stiffness)
+        matrix = self._mass * (1.0 / hgamma)
+        matrix += self._implicit
+        matrix.reshape(-1)[:: size + 1] += self._damping(time, u, w)
+        factor, info = dpotrf(matrix)
         if info != 0:
             raise SimulationError(self._not_positive(u))
-        rate = w
-        rhs = force - stiffness.dot(w)
+        self._sides[:, size:] = self._mass
+        solve = dpotrs(factor, self._sides)[0]
+        rates[:] = w
+        accelerations[:] = self.acceleration
         for i in range(self._stages):
             if i > 0:
                 shift, coupling = self._combine[i].dot(increments[:i])
                 stage = y + shift
                 u, w = stage[:size], stage[size:]
                 self._find_load(time + elapsed[i], elapsed[i], biases[i], u, w, LOAD_ROUNDS)
-                acceleration = self._acceleration(time + elapsed[i], elapsed[i], biases[i], u, w)
-                rate = w + coupling[:size]
-                rhs = mass.dot(acceleration + coupling[size:]) - stiffness.dot(rate)
-            change = dpotrs(factor, rhs)[0]
-            row = increments[i]
-            row[size:] = change
-            row[:size] = hgamma * (rate + change)
+                rates[:] = w
+                accelerations[:] = self._acceleration(time + elapsed[i], elapsed[i], biases[i], u, w)
+                right += coupling
+            row_u, row_w = self._rows[i]
+            np.dot(solve, right, out=row_w)
+            np.add(rates, row_w, out=row_u)
+            row_u *= hgamma
         result: FloatArray = y + self._weights.dot(increments)
         return result
 
@@ -204,7 +233,7 @@ class ClosedLoop:
         """What the bodies need at rigid joints, where an effect asks for it: it depends on the acceleration."""
         if self._bodies is None:
             return
-        x, v = self._map.dot(u) + self._offset, self._map.dot(w)
+        x, v = self._position(u), self._map.dot(w)
         for _ in range(rounds):
             acceleration = self._map.dot(self._acceleration(time, elapsed, bias, u, w))
             load = self._map_t.dot(pin.rnea(self._bodies, self._bodies_data, x, v, acceleration))[: self.n].tolist()
@@ -221,7 +250,7 @@ class ClosedLoop:
                 raise SimulationError(self._not_positive(u))
         else:  # every coordinate is a joint of Pinocchio's model: its forward dynamics are the shorter way
             force = self._inverse_t.dot(np.array(self._forces(time, elapsed, bias, u, w)))
-            x = self._map.dot(u) + self._offset
+            x = self._position(u)
             acceleration = self._inverse.dot(pin.aba(self._model, self._data, x, self._map.dot(w), force))
         result: FloatArray = acceleration
         return result
@@ -235,30 +264,21 @@ class ClosedLoop:
         w: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """Mass matrix (size, size), and forces (size,) with gravity, Coriolis and centrifugal forces in them."""
-        x = self._map.dot(u) + self._offset
+        x = self._position(u)
         force = np.array(self._forces(time, elapsed, bias, u, w))
         force -= self._map_t.dot(pin.nonLinearEffects(self._model, self._data, x, self._map.dot(w)))
         mass: FloatArray = self._map_t.dot(pin.crba(self._model, self._data, x)).dot(self._map)
         return mass, force
 
-    def _jacobian(self, time: float, u: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Symmetric stiffness and damping of the forces: an approximation is enough for the method's order."""
-        stiffness, damping = self._constant_stiffness.copy(), self._constant_damping.copy()
-        position, velocity = u.tolist(), w.tolist()
-        for i, m, k1, k3, motor_slope, link_slope in self._slopes:
-            damping[m, m] += motor_slope(velocity[m])
-            if m != i:
-                deflection = position[m] - position[i]
-                k = k1 + 3.0 * k3 * deflection * deflection
-                stiffness[i, i] += k
-                stiffness[m, m] += k
-                stiffness[i, m] -= k
-                stiffness[m, i] -= k
-                if link_slope is not None:
-                    damping[i, i] += link_slope(velocity[i])
+    def _damping(self, time: float, u: FloatArray, w: FloatArray) -> list[float]:
+        """(size,) slopes of friction and planted effects over the speeds; a slope left out costs no order."""
+        velocity = w.tolist()
+        damping = [0.0] * self.size
+        for k, slope in self._slopes:
+            damping[k] += slope(velocity[k])
         if self.planted is not None:
             self.planted.add_damping(time, u, w, self.tau_motor, self.tau_spring, damping)
-        return stiffness, damping
+        return damping
 
     def _not_positive(self, u: FloatArray) -> str:
         robot = self.plant.robot
@@ -266,8 +286,7 @@ class ClosedLoop:
             k = int(np.flatnonzero(~np.isfinite(u))[0])
             i = k if k < self.n else self.elastic[k - self.n]
             return f"the position of joint {robot.joint_names[i]!r} is not finite"
-        x = self._map.dot(u) + self._offset
-        diagonal = np.diag(self._map_t @ pin.crba(self._model, self._data, x) @ self._map)
+        diagonal = np.diag(self._map_t @ pin.crba(self._model, self._data, self._position(u)) @ self._map)
         k = int(np.argmin(diagonal))
         i = k if k < self.n else self.elastic[k - self.n]
         side = "link" if k < self.n else "motor"

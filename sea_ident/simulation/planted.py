@@ -116,7 +116,7 @@ class PlantedTorques:
         w: FloatArray,
         tau_motor: list[float],
         tau_spring: list[float],
-        damping: FloatArray,
+        damping: list[float],
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
         n = len(self._link)
@@ -130,7 +130,7 @@ class PlantedTorques:
             for k in range(len(u))[side]:
                 slope = (changed[k] - base[k]) / (moved[k] - w[k])
                 if slope > 0.0:
-                    damping[k, k] += slope
+                    damping[k] += slope
 
     def accept(
         self, time: float, u: FloatArray, w: FloatArray, tau_motor: list[float], tau_spring: list[float]

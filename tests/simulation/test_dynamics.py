@@ -29,7 +29,8 @@ def full_model(robot):
 )
 def test_recorded_states_satisfy_the_regressor(build, quiet):
     robot = build()
-    simulation = simulate(robot, modest_series(robot), periods=1, **quiet)
+    series = modest_series(robot)
+    simulation = simulate(robot, series, periods=1, start=series.motion(np.zeros(1)), **quiet)
     model = full_model(robot)
     psi = np.nan_to_num(simulation.plant.values_of(model))
     regressor = build_regressor(robot, model, simulation.motion)

@@ -44,9 +44,9 @@ def test_planted_effect_acts_as_its_columns_say(leg, leg_series, quiet, exact, n
     assert share > 1e-3
 
 
-def test_spring_effects_are_part_of_the_spring_torque(leg, leg_series, quiet):
+def test_spring_effects_are_part_of_the_spring_torque(leg, leg_series, quiet, exact):
     effect = PlantedEffect(make_effect("spring_offset", "hip"), np.array([2.0]))
-    run = simulate(leg, leg_series, periods=1, effects=[effect], **quiet)
+    run = simulate(leg, leg_series, periods=1, effects=[effect], start=exact.motion, **quiet)
     d, plant = run.motion.deflection, run.plant
     law = plant.stiffness * d + plant.cubic_stiffness * d**3 + plant.spring_damping * run.motion.deflection_rate
     np.testing.assert_allclose(run.tau_spring - law, np.tile([2.0, 0.0, 0.0], (len(d), 1)), atol=1e-10)
@@ -56,7 +56,9 @@ def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet):
     robot = ur10()
     effect = make_effect("load_dependent_friction", "elbow_joint")
     values = np.array([0.1])
-    run = simulate(robot, modest_series(robot), periods=1, effects=[PlantedEffect(effect, values)], **quiet)
+    series = modest_series(robot)
+    planted, begin = [PlantedEffect(effect, values)], series.motion(np.zeros(1))
+    run = simulate(robot, series, periods=1, effects=planted, start=begin, **quiet)
     own = base_effects(robot)
     psi = np.concatenate([np.nan_to_num(plant_from_robot(robot).values_of(own)), values])
     regressor = build_regressor(robot, (*own, effect), run.motion)
@@ -89,11 +91,12 @@ def test_sensor_effects_change_the_recording_and_not_the_robot(leg, leg_series, 
     np.testing.assert_allclose(np.abs(shift), np.tile([0.0, 0.01, 0.0], (len(shift), 1)), atol=1e-12)
 
 
-def test_payload_is_carried(leg, leg_series, quiet):
+def test_payload_is_carried(leg, leg_series, quiet, exact):
     effect = make_effect("payload", "ankle")
     values = np.zeros(len(effect.columns(leg)))
     values[0] = 1.0
-    run = simulate(leg, leg_series, periods=1, effects=[PlantedEffect(effect, values)], **quiet)
+    planted = [PlantedEffect(effect, values)]
+    run = simulate(leg, leg_series, periods=1, effects=planted, start=exact.motion, **quiet)
     more = run.plant.robot.inertial_parameters - leg.inertial_parameters
     assert more[20] == pytest.approx(1.0)
     own = base_effects(run.plant.robot)

@@ -1,0 +1,95 @@
+"""Speed and accuracy of the simulation.
+
+    python tests/benchmarks/bench_simulation.py [--repeats 5]
+
+Prints the real-time factor (simulated time over CPU time of one core, settling included) with its spread, and how the
+error falls with the step. Nothing is asserted here.
+"""
+
+import argparse
+import platform
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "simulation"))
+
+from plants import baxter_arm, modest_series, ur10
+
+from sea_ident import load_robot
+from sea_ident.effects import make_effect
+from sea_ident.simulation import (
+    FrictionJitter,
+    PlantedEffect,
+    PreslidingCoulomb,
+    SensorNoise,
+    SmoothCoulomb,
+    simulate,
+)
+
+
+def real_time_factors(repeats: int) -> None:
+    leg = load_robot("exo_leg")
+    planted = [
+        PlantedEffect(make_effect("stribeck_friction", "knee"), np.array([0.3])),
+        PlantedEffect(make_effect("torque_ripple", "hip"), np.array([0.1, 0.1])),
+    ]
+    cases = {
+        "exo_leg": (leg, {"periods": 20}),
+        "exo_leg, presliding friction": (leg, {"periods": 20, "friction": PreslidingCoulomb()}),
+        "exo_leg, two planted effects": (leg, {"periods": 20, "effects": planted}),
+        "Baxter arm, seven springs": (baxter_arm(), {"periods": 5}),
+        "UR10, rigid": (ur10(), {"periods": 5}),
+    }
+    print(f"real-time factor, periods of 10 s with settling, sensor noise and jitter, {platform.processor() or 'CPU'}")
+    print(f"{'':32s}{'median':>8s}{'lowest':>8s}{'highest':>8s}{'us per step':>13s}")
+    for name, (robot, options) in cases.items():
+        series = modest_series(robot, base_frequency=0.1, harmonics=6)
+        factors = []
+        for seed in range(repeats):
+            begin = time.process_time()
+            run = simulate(robot, series, seed=seed, **options)
+            factors.append(run.steps * run.step / (time.process_time() - begin))
+        per_step = 1e6 * run.step / np.median(factors)
+        print(f"{name:32s}{np.median(factors):8.1f}{min(factors):8.1f}{max(factors):8.1f}{per_step:13.1f}")
+
+
+def step_table() -> None:
+    leg = load_robot("exo_leg")
+    series = modest_series(leg, base_frequency=0.1, harmonics=6)
+    quiet = {"periods": 1, "sensors": SensorNoise.none(), "jitter": FrictionJitter.none()}
+    begin = simulate(leg, series, **quiet).motion
+    print("\nexo_leg, one period: largest error against a step of 0.08 ms, and order")
+    for law in (SmoothCoulomb(0.02), SmoothCoulomb(), PreslidingCoulomb()):
+        print(
+            f"  {law}\n  {'step [ms]':>10s}{'q [rad]':>12s}{'dtheta [rad/s]':>16s}{'tau_motor [N m]':>17s}{'order':>8s}"
+        )
+        truth = simulate(leg, series, friction=law, start=begin, step=0.005 / 64, **quiet)
+        before = None
+        for substeps in (1, 2, 4, 8):
+            run = simulate(leg, series, friction=law, start=begin, step=0.005 / substeps, **quiet)
+            errors = [
+                np.abs(run.motion.q - truth.motion.q).max(),
+                np.abs(run.motion.dtheta - truth.motion.dtheta).max(),
+                np.abs(run.tau_motor - truth.tau_motor).max(),
+            ]
+            order = "" if before is None else f"{np.log2(before / errors[0]):8.2f}"
+            print(f"  {5.0 / substeps:10.4g}{errors[0]:12.2e}{errors[1]:16.2e}{errors[2]:17.2e}{order}")
+            before = errors[0]
+
+
+def settling_table() -> None:
+    print("\nsettling to 1e-8")
+    for name, robot in (("exo_leg", load_robot("exo_leg")), ("Baxter arm", baxter_arm()), ("UR10", ur10())):
+        run = simulate(robot, modest_series(robot, base_frequency=0.1, harmonics=6), periods=1)
+        print(f"  {name:12s}{run.settling_periods} periods, last change {run.settled:.1e}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--repeats", type=int, default=5)
+    real_time_factors(parser.parse_args().repeats)
+    step_table()
+    settling_table()
