@@ -1,8 +1,18 @@
 """Exciting trajectories: the motion that tells most about the parameters, inside every limit at every instant."""
 
-from sea_ident.excitation.criteria import AOptimality, ConditionNumber, Criterion, DOptimality, EOptimality
-from sea_ident.excitation.design import design_excitation, reduced_effects
+from sea_ident.excitation.criteria import (
+    AOptimality,
+    ConditionNumber,
+    Criterion,
+    Discrimination,
+    DOptimality,
+    EOptimality,
+    Scaling,
+)
+from sea_ident.excitation.design import design_excitation
+from sea_ident.excitation.design_model import reduced_effects
 from sea_ident.excitation.result import Excitation, read_excitation
+from sea_ident.excitation.springs import PredictedMotors
 from sea_ident.excitation.starts import Progress
 
 __all__ = [
@@ -10,9 +20,12 @@ __all__ = [
     "ConditionNumber",
     "Criterion",
     "DOptimality",
+    "Discrimination",
     "EOptimality",
     "Excitation",
+    "PredictedMotors",
     "Progress",
+    "Scaling",
     "design_excitation",
     "read_excitation",
     "reduced_effects",

@@ -125,7 +125,7 @@ def raise_inside(
     if placed is None:
         return coefficients
     point, sides = placed
-    value = criterion.value(information.eigenvalues(point))
+    value = criterion.value(information.matrix(point))
     forces = [barrier / side.slack for side in sides]
     damping, small = 1e-3, 0
     for _ in range(iterations):
@@ -142,7 +142,7 @@ def raise_inside(
             for halvings in range(4):
                 placed = place_inside(walls, middle, centre, point + 0.4**halvings * step.reshape(point.shape))
                 if placed is not None:
-                    found = criterion.value(information.eigenvalues(placed[0]))
+                    found = criterion.value(information.matrix(placed[0]))
                     if found > value:
                         break
             if found <= value:
@@ -164,12 +164,11 @@ def raise_inside(
 
 def quadratic_model(information: Information, criterion: Criterion, point: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(v,) exact gradient and (v, v) Gauss-Newton curvature of a criterion at (n, 2 L + 1) coefficients."""
-    local = information.model(point)
-    eigenvalues, vectors = np.linalg.eigh(local.matrix)
-    slope, weights = criterion.slope(eigenvalues)
-    gradient = local.gradient((vectors * slope) @ vectors.T)
-    changes = local.changes(vectors)
-    scaled = (changes * np.sqrt(np.maximum(weights, 0.0)).astype(np.float32)).reshape(len(changes), -1)
+    there = information.model(point)
+    local = criterion.local(there.matrix)
+    gradient = there.gradient(local.derivative)
+    changes = there.changes(local.vectors)
+    scaled = (changes * np.sqrt(local.weights).astype(np.float32)).reshape(len(changes), -1)
     return gradient, (scaled @ scaled.T).astype(np.float64)
 
 

@@ -7,26 +7,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.base_parameters import find_base_parameters
 from sea_ident.effects import Effect
-from sea_ident.effects.coulomb_friction import CoulombFriction
-from sea_ident.effects.rigid_bodies import RigidBodies
-from sea_ident.effects.viscous_friction import ViscousFriction
 from sea_ident.exceptions import ExcitationError, SeaIdentWarning
 from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.defaults import default_limits
+from sea_ident.excitation.design_model import design_model, reduced_effects
 from sea_ident.excitation.problem import Problem
 from sea_ident.excitation.result import Excitation
+from sea_ident.excitation.springs import PredictedMotors
 from sea_ident.excitation.starts import Progress, climb_from_starts
+from sea_ident.excitation.states import Sampling
 from sea_ident.robot import Limits, Robot
-
-
-def reduced_effects(robot: Robot) -> tuple[Effect, ...]:
-    """The model that an excitation can be designed for before anything is known (paper, eq. 14).
-
-    Bodies, and viscous and Coulomb friction lumped at the joints; no springs and no motor inertia.
-    """
-    return (*RigidBodies.instances(robot), *ViscousFriction.instances(robot), *CoulombFriction.instances(robot))
 
 
 def design_excitation(
@@ -39,6 +30,7 @@ def design_excitation(
     criterion: Criterion | None = None,
     effects: Sequence[Effect] | None = None,
     limits: Limits | None = None,
+    motors: PredictedMotors | None = None,
     rate: float = 200.0,
     information: FloatArray | None = None,
     noise: FloatArray | None = None,
@@ -57,9 +49,12 @@ def design_excitation(
         criterion: what to raise; log det by default.
         effects: the model whose parameters are to be told; `reduced_effects` by default.
         limits: limits of the motion; those of the robot by default.
+        motors: how motor positions follow from those of the links; theta = q by default. With `PredictedMotors` the
+            effects of springs can be among the effects; the rows of links and motors are then kept apart.
         rate: samples per second of the observation matrix [Hz].
         information: (p, p) information about the base parameters of `effects` that is there already.
-        noise: (n,) standard deviation of the torque noise of each joint [N m]; 1 by default.
+        noise: (n,) standard deviation of the torque noise of each joint [N m]; 1 by default. With `motors`, (2 n,) may
+            be given: links first, then motors.
         start: (n, 2 L + 1) coefficients of a further start; it is moved inside the limits if it is outside.
         jobs: starts that are climbed at the same time; the result does not depend on it.
         progress: called after every step.
@@ -74,16 +69,18 @@ def design_excitation(
     begin = time.perf_counter()
     samples = _check_sampling(base_frequency, harmonics, starts, rate)
     notes: list[str] = []
-    model = reduced_effects(robot) if effects is None else tuple(effects)
+    model, bound = design_model(
+        robot,
+        reduced_effects(robot) if effects is None else tuple(effects),
+        DOptimality() if criterion is None else criterion,
+        motors,
+    )
     problem = Problem.of(
         robot,
         model,
-        find_base_parameters(robot, model),
-        DOptimality() if criterion is None else criterion,
+        bound,
         default_limits(robot, robot.limits if limits is None else limits, notes),
-        base_frequency=base_frequency,
-        harmonics=harmonics,
-        samples=samples,
+        Sampling(base_frequency, harmonics, samples),
         noise=noise,
         collected=information,
         seed=seed,

@@ -18,7 +18,7 @@ from sea_ident.robot import Limits, Robot
 
 
 @dataclass(frozen=True, eq=False)
-class _Friction:
+class KnownFriction:
     """A friction with known values at one joint."""
 
     effect: JointEffect
@@ -49,7 +49,7 @@ class DynamicLimits:
     springs: FloatArray
     bound: FloatArray
     units: tuple[str, ...]
-    friction: tuple[_Friction, ...]
+    friction: tuple[KnownFriction, ...]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -145,18 +145,19 @@ def dynamic_limits(robot: Robot, limits: Limits, notes: list[str]) -> DynamicLim
         np.array(springs, dtype=bool),
         np.array(bounds),
         tuple(units),
-        _known_friction(robot),
+        known_friction(robot),
     )
 
 
-def _known_friction(robot: Robot) -> tuple[_Friction, ...]:
+def known_friction(robot: Robot) -> tuple[KnownFriction, ...]:
+    """Every friction with values in the robot's description."""
     found = []
     for kind, link in ((ViscousFriction, False), (CoulombFriction, False), (LinkFriction, True)):
         for effect in kind.instances(robot):
             assert isinstance(effect, JointEffect)
             values = np.nan_to_num(effect.prior(robot))
             if np.any(values):
-                found.append(_Friction(effect, robot.index(effect.required_joint), link, values))
+                found.append(KnownFriction(effect, robot.index(effect.required_joint), link, values))
     return tuple(found)
 
 

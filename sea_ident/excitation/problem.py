@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Effect, make_effect
 from sea_ident.exceptions import ExcitationError
-from sea_ident.excitation.columns import ModelColumns
-from sea_ident.excitation.criteria import Criterion
+from sea_ident.excitation.criteria import Criterion, log_det
+from sea_ident.excitation.design_model import DesignModel
 from sea_ident.excitation.dynamic_limits import DynamicLimits, dynamic_limits
 from sea_ident.excitation.feasibility import at_rest, comfortable_position, shrink
 from sea_ident.excitation.information import Information
 from sea_ident.excitation.linear_limits import LinearLimits, linear_limits
 from sea_ident.excitation.result import Excitation
+from sea_ident.excitation.states import Sampling
 from sea_ident.excitation.walls import DynamicWall, LinearWall, Wall
 from sea_ident.motion import FourierSeries
 from sea_ident.robot import Limits, Robot
@@ -31,7 +31,7 @@ class Problem:
 
     Attributes:
         robot: the robot.
-        base: base parameters of the model.
+        model: the columns.
         criterion: what to raise.
         fine: information at the samples of the result.
         limits: limits that are linear in the coefficients.
@@ -41,7 +41,7 @@ class Problem:
     """
 
     robot: Robot
-    base: BaseParameters
+    model: DesignModel
     criterion: Criterion
     fine: Information
     limits: LinearLimits
@@ -52,14 +52,11 @@ class Problem:
     @staticmethod
     def of(
         robot: Robot,
-        effects: tuple[Effect, ...],
-        base: BaseParameters,
+        model: DesignModel,
         criterion: Criterion,
         limits: Limits,
+        sampling: Sampling,
         *,
-        base_frequency: float,
-        harmonics: int,
-        samples: int,
         noise: FloatArray | None,
         collected: FloatArray | None,
         seed: int,
@@ -71,23 +68,30 @@ class Problem:
             ExcitationError: wrong sizes.
             InfeasibleError: limits that exclude each other.
         """
-        weights, prior = _check_weights(robot, base, noise, collected)
-        columns = ModelColumns(robot, effects, base.independent)
-        fine = Information(columns, base_frequency, harmonics, samples, 1.0, weights, prior)
+        weights = _row_weights(model, noise)
+        prior = _collected(model, collected)
+        fine = Information(model.columns, sampling, 1.0, weights, prior, model.springs)
         linear, dynamic = linear_limits(robot, limits), dynamic_limits(robot, limits, notes)
+        frequency, harmonics = sampling.base_frequency, sampling.harmonics
         nonlinear: list[Wall] = []
         if len(dynamic):
-            nonlinear.append(DynamicWall.of(dynamic, base_frequency, harmonics, _DYNAMIC_POINTS * harmonics))
+            nonlinear.append(DynamicWall.of(dynamic, frequency, harmonics, _DYNAMIC_POINTS * harmonics))
         position = comfortable_position(
             linear, nonlinear, harmonics, dynamic.names, np.random.default_rng([seed, 2**31])
         )
-        wall = LinearWall.of(linear, base_frequency, harmonics, _LINEAR_POINTS * harmonics)
-        return Problem(robot, base, criterion, fine, linear, dynamic, (wall, *nonlinear), at_rest(position, harmonics))
+        wall = LinearWall.of(linear, frequency, harmonics, _LINEAR_POINTS * harmonics)
+        centre = at_rest(position, harmonics)
+        return Problem(robot, model, criterion, fine, linear, dynamic, (wall, *nonlinear), centre)
 
     @property
     def base_frequency(self) -> float:
         """[Hz]."""
-        return self.fine.base_frequency
+        return self.fine.sampling.base_frequency
+
+    @property
+    def harmonics(self) -> int:
+        """L."""
+        return self.fine.sampling.harmonics
 
     def series(self, coefficients: FloatArray) -> FourierSeries:
         """The motion of (n, 2 L + 1) coefficients."""
@@ -103,26 +107,27 @@ class Problem:
             samples: at most so many per period.
             smoothing: (n,) least smoothing of the friction of each joint [rad/s] or [m/s].
         """
-        count = min(samples, self.fine.samples)
+        whole = self.fine.sampling.samples
+        count = min(samples, whole)
         effects = tuple(_smoothed(effect, self.robot, smoothing) for effect in self.fine.columns.effects)
         return replace(
             self.fine,
             columns=replace(self.fine.columns, effects=effects),
-            samples=count,
-            gain=self.fine.samples / count,
+            sampling=replace(self.fine.sampling, samples=count),
+            gain=whole / count,
         )
 
     def value(self, information: Information, coefficients: FloatArray) -> float:
         """The criterion."""
-        return self.criterion.value(information.eigenvalues(coefficients))
+        return self.criterion.value(information.matrix(coefficients))
 
     def margins(self, coefficients: FloatArray) -> FloatArray:
         """(m,) smallest distance to each linear limit over all t, then to each dynamic limit."""
         linear = self.limits.margins(self.series(coefficients))
         if not len(self.dynamic):
             return linear
-        points = _CHECK_POINTS * self.fine.harmonics
-        wall = DynamicWall.of(self.dynamic, self.base_frequency, self.fine.harmonics, points)
+        points = _CHECK_POINTS * self.harmonics
+        wall = DynamicWall.of(self.dynamic, self.base_frequency, self.harmonics, points)
         values = wall.values(coefficients)
         below, above = wall.overshoot(values)
         room = np.minimum(values - below - wall.lower, wall.upper - values - above).min(axis=1)
@@ -154,7 +159,7 @@ class Problem:
     ) -> Excitation:
         """The excitation of a trajectory."""
         matrix = self.fine.matrix(coefficients)
-        eigenvalues = self.fine.eigenvalues(coefficients)
+        eigenvalues = np.linalg.eigvalsh(matrix)
         scale = 1.0 / np.sqrt(np.diag(matrix))
         normalised = np.linalg.eigvalsh(matrix * np.outer(scale, scale))
         bound = self.dynamic.bound
@@ -166,12 +171,12 @@ class Problem:
             joint_names=self.robot.joint_names,
             robot=self.robot.source,
             criterion=self.criterion.name,
-            value=self.criterion.reported(eigenvalues),
-            log_det=float(np.log(eigenvalues).sum()),
+            value=self.criterion.reported(matrix),
+            log_det=log_det(matrix),
             condition_number=float(np.sqrt(normalised[-1] / normalised[0])),
             raw_condition_number=float(np.sqrt(eigenvalues[-1] / eigenvalues[0])),
-            parameters=self.base.names,
-            samples=self.fine.samples,
+            parameters=self.model.names,
+            samples=self.fine.sampling.samples,
             margins={name: float(value) for name, value in zip(names, margins, strict=True)},
             limits={name: (float(lower[k]), float(upper[k])) for k, name in enumerate(names)},
             starts=starts,
@@ -190,19 +195,26 @@ def _smoothed(effect: Effect, robot: Robot, smoothing: FloatArray) -> Effect:
     return make_effect(effect.name, effect.joint, **widened)
 
 
-def _check_weights(
-    robot: Robot, base: BaseParameters, noise: FloatArray | None, collected: FloatArray | None
-) -> tuple[FloatArray, FloatArray]:
-    """(n,) weight of each row, and (p, p) information that is there already."""
-    p = base.rank
+def _row_weights(model: DesignModel, noise: FloatArray | None) -> FloatArray:
+    """(R,) one over the standard deviation of each row."""
+    n, rows = model.columns.robot.n, model.columns.rows
+    deviation = np.ones(rows) if noise is None else np.asarray(noise, dtype=np.float64)
+    if deviation.shape == (n,) and rows == 2 * n:
+        deviation = np.tile(deviation, 2)
+    if deviation.shape != (rows,) or not np.all(np.isfinite(deviation) & (deviation > 0.0)):
+        raise ExcitationError(f"noise must be {n} positive standard deviations [N m], not {noise}")
+    return 1.0 / deviation
+
+
+def _collected(model: DesignModel, collected: FloatArray | None) -> FloatArray:
+    """(p, p) information that is there already."""
+    p = len(model.columns.chosen)
     prior = np.zeros((p, p)) if collected is None else np.asarray(collected, dtype=np.float64)
     if prior.shape != (p, p) or not np.all(np.isfinite(prior)):
         raise ExcitationError(
-            f"information is {prior.shape}; it must be a finite ({p}, {p}) matrix about {', '.join(base.names)}"
+            f"information is {prior.shape}; it must be a finite ({p}, {p}) matrix about {', '.join(model.names)}"
         )
-    if float(np.linalg.eigvalsh(prior + prior.T)[0]) < -1e-6 * max(float(np.abs(prior).max()), 1e-300):
-        raise ExcitationError("information has a negative eigenvalue; it must be positive semidefinite, as F' F")
-    deviation = np.ones(robot.n) if noise is None else np.asarray(noise, dtype=np.float64)
-    if deviation.shape != (robot.n,) or not np.all(np.isfinite(deviation) & (deviation > 0.0)):
-        raise ExcitationError(f"noise must be {robot.n} positive standard deviations [N m], not {deviation}")
-    return 1.0 / deviation, 0.5 * (prior + prior.T)
+    prior = 0.5 * (prior + prior.T)
+    if float(np.linalg.eigvalsh(prior)[0]) < -1e-9 * float(np.abs(prior).max()):
+        raise ExcitationError("information has a negative eigenvalue; it must be positive semidefinite, as F' F is")
+    return prior

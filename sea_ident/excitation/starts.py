@@ -8,6 +8,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from sea_ident._typing import FloatArray
+from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.barrier import raise_inside
 from sea_ident.excitation.feasibility import random_start, repair
 from sea_ident.excitation.information import Information
@@ -18,6 +19,7 @@ _SCOUT_SAMPLES = 12
 _CLIMB_SAMPLES = 50
 _SCOUT_STEPS = 10
 _CLIMB_STEPS = 60
+_DRAWS = 5
 
 
 @dataclass(frozen=True)
@@ -98,24 +100,28 @@ def climb_from_starts(
         The best trajectory.
     """
     board = _Board(starts, progress)
-    harmonics = problem.fine.harmonics
+    harmonics = problem.harmonics
     count = starts + (given is not None)
 
     def scout(start: int) -> float:
-        if start < starts:
-            generator = np.random.default_rng([seed, start])
-            point = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
+        generator = np.random.default_rng([seed, start])
+        for _ in range(_DRAWS):
+            if start < starts or given is None:
+                point = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
+            else:
+                point = repair(problem.limits, problem.base_frequency, problem.centre, given)
+            point = _loosen(problem, point)
+            information = problem.coarse(_SCOUT_SAMPLES * harmonics, 0.3 * _speed(problem, point))
+            if np.isfinite(problem.value(information, point)):
+                break
         else:
-            assert given is not None
-            point = repair(problem.limits, problem.base_frequency, problem.centre, given)
-        point = _loosen(problem, point)
+            raise ExcitationError(_singular(problem, information, point))
         board.latest[start] = point
-        information = problem.coarse(_SCOUT_SAMPLES * harmonics, 0.3 * _speed(problem, point))
         return _raise(problem, information, board, start, _SCOUT_STEPS, 1e-2, 3e-2)
 
     def climb(start: int) -> None:
         point = board.latest[start]
-        samples = min(problem.fine.samples, _CLIMB_SAMPLES * harmonics)
+        samples = min(problem.fine.sampling.samples, _CLIMB_SAMPLES * harmonics)
         spacing = 1.0 / (problem.base_frequency * samples)
         information = problem.coarse(samples, 0.5 * spacing * _speed(problem, point, derivative=2))
         _raise(problem, information, board, start, _CLIMB_STEPS, 1e-3, 1e-3)
@@ -155,6 +161,18 @@ def _raise(
     )
     board.latest[start] = point
     return problem.value(information, point)
+
+
+def _singular(problem: Problem, information: Information, point: FloatArray) -> str:
+    """Say which parameters a trajectory does not show."""
+    matrix = information.matrix(point)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    _, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    hidden = [problem.model.names[int(k)] for k in np.argsort(-np.abs(vectors[:, 0]))[:3]]
+    return (
+        f"no trajectory was found that shows all {len(matrix)} parameters; least visible: {', '.join(hidden)}. Take more "
+        f"harmonics, wider limits, or fewer effects"
+    )
 
 
 def _loosen(problem: Problem, point: FloatArray) -> FloatArray:
