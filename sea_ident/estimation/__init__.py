@@ -11,6 +11,7 @@ from sea_ident.estimation.estimators import (
     Robust,
 )
 from sea_ident.estimation.identify import identify
+from sea_ident.estimation.long_recording import identify_stream
 from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
 from sea_ident.estimation.model_file import model_from_dict, read_model
 from sea_ident.estimation.observations import Observations
@@ -41,6 +42,7 @@ __all__ = [
     "Verdict",
     "identify",
     "identify_springs",
+    "identify_stream",
     "model_from_dict",
     "physical_parameters",
     "read_model",

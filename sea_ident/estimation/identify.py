@@ -13,6 +13,7 @@ from sea_ident.effects import Effect, base_effects
 from sea_ident.effects.base import Side
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
+from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.estimation.solve import condition_number, solve_weighted
@@ -30,6 +31,9 @@ VISIBLE = 1e-7
 
 SLOW = 0.01
 """v_off of Coulomb friction as a share of the largest speed, at joints where the usual v_off is more than 5 % of it."""
+
+DENSE = 200 * 2**20
+"""Bytes of regressor beyond which one stretch is reduced piece by piece."""
 
 EXCERPT = 500
 """Samples of the mean period that a model keeps."""
@@ -86,6 +90,9 @@ def identify(
     base, lost = visible_parameters(robot, chosen, processed)
     found.extend(lost)
     observations = Observations(robot, chosen, base, processed)
+    if processed.periods == 1 and processed.samples * robot.n * base.rank * 8 > DENSE:
+        model, more = identify_long(observations, how, unknown_zero)
+        return _reported(model, [*found, *more], first, processed.notes)
     estimate = how.estimate(observations)
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
@@ -94,9 +101,14 @@ def identify(
     springs = springs_from(observations, estimate.values, uncertainty, unknown_zero)
     found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict == "circular")
     model = replace(model, springs=springs)
+    return _reported(model, found, first, (*processed.notes, *estimate.notes))
+
+
+def _reported(model: Model, found: list[str], first: int, notes: tuple[str, ...]) -> Model:
+    """The model with its warnings, those that are new also raised."""
     for text in found[first:]:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
-    return replace(model, warnings=tuple(dict.fromkeys(found)), notes=(*processed.notes, *estimate.notes))
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+    return replace(model, warnings=tuple(dict.fromkeys(found)), notes=notes)
 
 
 def default_estimator(processed: ProcessedRecording) -> Estimator:

@@ -15,11 +15,11 @@ from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
-from sea_ident.regressor import Regressor, build_regressor
+from sea_ident.regressor import Regressor, build_regressor, build_total
 from sea_ident.robot import Robot
 
-CHUNK = 1000
-"""Samples of which the regressor is held at once."""
+CHUNK = 20_000
+"""Samples of which the regressor is held at once; whole periods, where they are no longer than this."""
 
 REVERSAL = 2.0
 """Speed, in v_off, below which Coulomb friction is not modelled (paper, eq. 3)."""
@@ -59,8 +59,10 @@ def base_rows(
 ) -> FloatArray:
     """(N, n, b) rows of the motor torque in the base parameters (paper, eq. 8)."""
     rows = np.empty((len(motion), robot.n, base.rank))
-    for part, regressor in _chunks(robot, effects, motion, channels):
-        np.add(regressor.link[:, :, base.independent], regressor.motor[:, :, base.independent], out=rows[part])
+    for start in range(0, len(motion), CHUNK):
+        part = slice(start, start + CHUNK)
+        some = None if channels is None else {kind: values[part] for kind, values in channels.items()}
+        rows[part] = build_total(robot, effects, motion[part], some, base.independent)
     return rows
 
 
@@ -86,6 +88,24 @@ def _determined(columns: FloatArray, base: BaseParameters) -> bool:
     scale = np.abs(flat).max(axis=0)
     left = np.abs(flat - flat[:, base.independent] @ base.grouping).max(axis=0)
     return bool(np.all(left <= 1e-7 * np.maximum(scale, 1e-6 * scale.max(initial=0.0))))
+
+
+def friction_is_modelled(robot: Robot, effects: Sequence[Effect], motion: Motion) -> NDArray[np.bool_]:
+    """(N, n) False where a joint with Coulomb friction is close to rest.
+
+    tanh(v / v_off) stands for the sign above 2 v_off (paper, eq. 3); below, friction is anything up to breakaway.
+    """
+    valid = np.ones(motion.q.shape, dtype=bool)
+    for effect in effects:
+        if isinstance(effect, CoulombFriction):
+            joint, speed = effect.required_joint, motion.dtheta
+        elif isinstance(effect, LinkFriction):
+            joint, speed = effect.required_joint, motion.dq
+        else:
+            continue
+        index = robot.index(joint)
+        valid[:, index] &= np.abs(speed[:, index]) > REVERSAL * effect.smoothing
+    return valid
 
 
 def _chunks(
@@ -133,6 +153,9 @@ class Observations:
         robot, base = self.robot, self.base
         elastic = robot.elastic_indices
         side = self.spring_side
+        if side is SpringSide.NONE:
+            total = base_rows(robot, self.effects, base, motion, self.processed.channels)
+            return Rows(total, np.zeros((len(motion), len(elastic), base.rank)))
         total = np.empty((len(motion), robot.n, base.rank))
         spring = np.zeros((len(motion), len(elastic), base.rank))
         for part, regressor in _chunks(robot, self.effects, motion, self.processed.channels):
@@ -169,24 +192,10 @@ class Observations:
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
-        """(N, n) where the friction model claims to hold: not while a joint with Coulomb friction is close to rest.
-
-        tanh(v / v_off) stands for the sign above 2 v_off (paper, eq. 3); below, friction is anything up to breakaway.
-        """
-        motion = self.processed.motion
-        valid = np.ones(motion.q.shape, dtype=bool)
-        for effect in self.effects:
-            if isinstance(effect, CoulombFriction):
-                joint, speed = effect.required_joint, motion.dtheta
-            elif isinstance(effect, LinkFriction):
-                joint, speed = effect.required_joint, motion.dq
-            else:
-                continue
-            index = self.robot.index(joint)
-            moving = np.abs(speed[:, index]) > REVERSAL * effect.smoothing
-            if np.any(moving):
-                valid[:, index] &= moving
-        return valid
+        """(N, n) where the friction model claims to hold, see `friction_is_modelled`."""
+        valid = friction_is_modelled(self.robot, self.effects, self.processed.motion)
+        # a joint that never leaves rest keeps its rows: there is nothing else of it
+        return np.asarray(valid | ~np.any(valid, axis=0), dtype=np.bool_)
 
     def residual(self, values: FloatArray) -> FloatArray:
         """(N, n) torque less what the parameters (b,) explain [N m] or [N]."""

@@ -199,7 +199,19 @@ def _scores(observations: Observations, estimate: Estimate, residual: FloatArray
     samples = len(residual)
     edges = np.linspace(0, samples, _block_count(observations) + 1).astype(int)
     scores = np.stack([np.einsum("kn,knb->b", residual[a:b], estimate.instruments[a:b]) for a, b in pairwise(edges)])
-    scores = scores @ estimate.inverse.T
+    return bartlett(scores @ estimate.inverse.T, residual.shape[1])
+
+
+def bartlett(scores: FloatArray, joints: int) -> FloatArray:
+    """Covariance of a sum of terms that are correlated with their neighbours.
+
+    Args:
+        scores: (blocks, b) terms in their order.
+        joints: n; every block has lost b / n degrees of freedom to the fit.
+
+    Returns:
+        (b, b) covariance, with Bartlett's weights for two neighbours on each side.
+    """
     own = scores.T @ scores
     covariance = own.copy()
     for lag, weight in ((1, 2.0 / 3.0), (2, 1.0 / 3.0)):
@@ -208,5 +220,5 @@ def _scores(observations: Observations, estimate: Estimate, residual: FloatArray
             covariance = covariance + weight * (product + product.T)
     if np.any(np.diag(covariance) < 0.25 * np.diag(own)):
         covariance = own
-    freedom = max(len(scores) - len(estimate.values) / max(residual.shape[1], 1), 1.0)
+    freedom = max(len(scores) - scores.shape[1] / max(joints, 1), 1.0)
     return np.asarray(covariance * (len(scores) / freedom), dtype=np.float64)
