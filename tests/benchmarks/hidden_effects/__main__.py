@@ -1,4 +1,14 @@
-"""`python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR [--row ROW] [--jobs 2]`, `table DIR`."""
+"""Hidden-effect benchmark: is what is missing from a model found, and named rightly?
+
+    python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR [--row ROW] [--jobs 2]
+    python -m tests.benchmarks.hidden_effects table DIR
+
+Robot, true parameters, trajectory, noise, effects, places and sizes of a case follow from the seed, the row and the
+number of the case. Two engines make the recordings: MuJoCo with forces and time stepping of the benchmark's own, and
+the project's simulator. The diagnosis runs in a process of its own that gets the folder `cases/<case>` with the
+recordings and the nominal description; the truth is in `truth/<case>.json`, read by the scores alone. A run that was
+stopped goes on where it was. `table.txt`, `misses.txt` and `confusion.png` are written beside the cases.
+"""
 
 import argparse
 from pathlib import Path
@@ -10,7 +20,9 @@ from tests.benchmarks.hidden_effects.table import write_report
 
 def main() -> None:
     """Run cases or print the table of a run."""
-    parser = argparse.ArgumentParser(prog="hidden_effects", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="hidden_effects", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     verbs = parser.add_subparsers(dest="verb", required=True)
     runs = verbs.add_parser("run", help="draw, simulate and diagnose cases; goes on where it was stopped")
     runs.add_argument("--cases", type=int, default=10, help="cases per row")

@@ -160,7 +160,7 @@ def _parallel(p: Place) -> tuple[float, float, dict[str, float]]:
 LIBRARY: tuple[Entry, ...] = (
     Entry("stribeck_friction", "library", _stribeck),
     Entry("nonlinear_viscous_friction", "library", lambda p: (
-        p.sign() * 0.2 * p.coulomb, 20.0 * p.coulomb, {"exponent": float(p.rng.uniform(1.7, 2.6))})),
+        0.2 * p.coulomb, 20.0 * p.coulomb, {"exponent": float(p.rng.uniform(1.7, 2.6))})),
     Entry("presliding_friction", "library", _presliding(0.0)),
     Entry("load_dependent_friction", "library", lambda p: (0.05, 0.5, {})),
     Entry("directional_efficiency", "library", lambda p: (0.05, 0.5, {})),
@@ -206,7 +206,7 @@ OTHER_FORMS: tuple[Entry, ...] = (
         accepted=("presliding_friction",)),
     Entry("stribeck_friction", "lorentz", _stribeck),
     Entry("nonlinear_viscous_friction", "exponent", lambda p: (
-        p.sign() * 0.2 * p.coulomb, 20.0 * p.coulomb, {"exponent": float(p.rng.choice([1.4, 3.3]))})),
+        0.2 * p.coulomb, 20.0 * p.coulomb, {"exponent": float(p.rng.choice([1.4, 3.3]))})),
     Entry("nonlinear_viscous_friction", "fading", lambda p: (
         0.5 * p.coulomb, 60.0 * p.coulomb, {"speed": p.between(0.15, 0.6)}), accepted=("stribeck_friction",)),
     Entry("presliding_friction", "lugre", _presliding(0.5), accepted=("stribeck_friction",)),

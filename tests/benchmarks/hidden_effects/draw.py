@@ -108,9 +108,9 @@ def draw_case(seed: int, row: str, index: int) -> Case:
         index=index,
         robot=robot,
         engine="mujoco",
-        period=float(rng.choice([4.0, 5.0, 8.0] if robot == "exo_leg" else [5.0, 8.0])),
+        period=float(rng.choice([4.0, 5.0, 8.0] if robot == "exo_leg" else [5.0])),
         periods=20 if row != "none" or index % 2 == 0 else 10,
-        holdout_periods=10,
+        holdout_periods=8,
         weak=what.weak,
         channel="current" if rng.random() < 0.25 else "tau_motor",
         friction_form=form,
@@ -187,7 +187,7 @@ def _one(
                 continue
             try:
                 planted = draw_effect(entry, gauge, int(joint), target, rng)
-            except FloatingPointError:
+            except ArithmeticError:
                 continue
             if planted is not None:
                 return planted

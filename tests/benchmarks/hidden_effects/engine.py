@@ -31,12 +31,14 @@ class Exact:
         tau_spring: (N, n) torque that the spring gives to the link, at a rigid joint the motor torque less its
             friction [N m].
         temperature: (N, n) of the motors [degC].
+        period: [s].
     """
 
     motion: Motion
     tau_motor: FloatArray
     tau_spring: FloatArray
     temperature: FloatArray
+    period: float
 
 
 @dataclass(frozen=True)
@@ -304,7 +306,7 @@ def simulate_mujoco(
         else:
             temperature[:, i] += (6.0 + i) * (1.0 - np.exp(-clock / (0.2 * (i + 2) * duration)))
     motion = Motion(clock, *(np.ascontiguousarray(log[:, k]) for k in range(6)))
-    return Exact(motion, log[:, 6].copy(), log[:, 7].copy(), temperature)
+    return Exact(motion, log[:, 6].copy(), log[:, 7].copy(), temperature, series.period)
 
 
 def _structure(

@@ -116,7 +116,7 @@ def _stribeck_lorentz(p, truth, i, hooks, wide, step, duration):  # type: ignore
 
 def _power(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
     c, e = p.size, p.shape["exponent"]
-    hooks[i].smooth.append(lambda s: copysign(c * abs(s.dth) ** e, s.dth))
+    hooks[i].smooth.append(lambda s: c * copysign(abs(s.dth) ** e, s.dth))
 
 
 def _fading_viscous(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
@@ -210,7 +210,7 @@ def _saturation_tanh(p, truth, i, hooks, wide, step, duration):  # type: ignore[
 
 def _stiffening(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
     c, e = p.size, p.shape["exponent"]
-    hooks[i].spring.append(lambda s, ts: ts + copysign(c * abs(s.d) ** e, s.d))
+    hooks[i].spring.append(lambda s, ts: ts + c * copysign(abs(s.d) ** e, s.d))
 
 
 def _stiffening_tan(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
@@ -229,7 +229,7 @@ def _asymmetric_kink(p, truth, i, hooks, wide, step, duration):  # type: ignore[
 
 
 def _maxwell_slip(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
-    """Two Maxwell-slip elements of width w and 2 w in the deflection; `size` is their total force."""
+    """Two Maxwell-slip elements of width w and 3 w in the deflection; `size` is their total force."""
     w = p.shape["width"]
     force, memory = p.size, [0.0, 0.0, None]
 
@@ -239,7 +239,7 @@ def _maxwell_slip(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-
         move = s.d - memory[2]
         memory[2] = s.d
         memory[0] = min(max(memory[0] + move / w, -1.0), 1.0)
-        memory[1] = min(max(memory[1] + move / (2.0 * w), -1.0), 1.0)
+        memory[1] = min(max(memory[1] + move / (3.0 * w), -1.0), 1.0)
         return ts + 0.5 * force * (memory[0] + memory[1])
 
     hooks[i].spring.append(law)

@@ -155,6 +155,6 @@ class Gauge:
                 return None
             try:
                 best = self.measure(replace(best, size=size))
-            except FloatingPointError:
+            except ArithmeticError:
                 return None
         return best if 0.75 < best.gap / target < 1.35 else None

@@ -100,7 +100,7 @@ def planted_effects(
         case "parallel_spring":
             yield one(c, -c * s["rest"])
         case "base_tilt":
-            yield one(c * s["x"], c * s["y"])
+            yield one(-c * s["x"], -c * s["y"])
         case "link_flexibility":
             yield one(compliance=c)
         case "transmission_coupling":
@@ -111,8 +111,10 @@ def planted_effects(
             yield one(offset=c)
         case "encoder_eccentricity":
             yield one(sine=turn[0], cosine=turn[1])
-        case "position_delay" | "torque_delay":
+        case "position_delay":
             yield one(delay=c)
+        case "torque_delay":  # here the current lags, there it leads
+            yield one(delay=-c)
         case "friction_drift":
             yield drift(c * float(truth.viscous[i]), c * float(truth.coulomb[i]), smoothing=smoothing)
         case "stiffness_drift":

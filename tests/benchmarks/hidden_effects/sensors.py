@@ -24,6 +24,7 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
     q, theta, tau = exact.motion.q.copy(), exact.motion.theta.copy(), exact.tau_motor.copy()
     rigid = ~np.array(truth.robot.elastic, dtype=bool)
     duration = float(time[-1])
+    period = round(exact.period / float(time[1] - time[0]))
     for p in planted:
         i = 0 if p.joint is None else names.index(p.joint)
         match p.effect:
@@ -32,9 +33,9 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
             case "encoder_eccentricity":
                 q[:, i] += p.size * np.sin(q[:, i] + p.shape["phase"])
             case "position_delay":
-                q[:, i] = delayed(time, q[:, i], p.size)
+                q[:, i] = delayed(time, q[:, i], p.size, period)
             case "torque_delay":
-                tau[:, i] = delayed(time, tau[:, i], p.size)
+                tau[:, i] = delayed(time, tau[:, i], p.size, period)
             case "torque_constant":
                 tau[:, i] /= 1.0 + p.size
             case "common_torque_constant":
@@ -50,14 +51,26 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
     return {"q": q, "theta": theta, "tau_motor": tau, "temperature": exact.temperature}
 
 
-def delayed(time: FloatArray, values: FloatArray, delay: float) -> FloatArray:
-    """A signal of before; the first samples repeat those of the first period's start."""
+def delayed(time: FloatArray, values: FloatArray, delay: float, period: int) -> FloatArray:
+    """A signal of before, by cubic interpolation.
+
+    Args:
+        time: (N,) [s].
+        values: (N,) the signal.
+        delay: [s].
+        period: samples of a period; what was before the recording is taken from the end of its first period.
+
+    Returns:
+        (N,) the delayed signal.
+    """
     step = float(time[1] - time[0])
-    # cubic around the delayed instant
-    position = np.arange(len(values)) - delay / step
-    lower = np.clip(np.floor(position).astype(int), 1, len(values) - 3)
-    s = np.clip(position - lower, -1.0, 2.0)
-    p0, p1, p2, p3 = (values[lower + k] for k in (-1, 0, 1, 2))
+    ahead = int(np.ceil(delay / step)) + 3
+    padded = np.concatenate([values[period - ahead : period], values])
+    position = np.arange(len(values)) + ahead - delay / step
+    lower = np.floor(position).astype(int)
+    lower = np.minimum(lower, len(padded) - 3)
+    s = position - lower
+    p0, p1, p2, p3 = (padded[lower + k] for k in (-1, 0, 1, 2))
     result: FloatArray = (
         -s * (s - 1) * (s - 2) / 6 * p0
         + (s + 1) * (s - 1) * (s - 2) / 2 * p1
