@@ -94,7 +94,7 @@ def write_hdf5(recording: Recording, path: Path) -> None:
             raise RecordingError(f"column {name!r} cannot name an HDF5 dataset; choose another format")
     with h5py.File(path, "w", track_order=True) as root:
         for name, values in {TIME: recording.time, **recording.columns}.items():
-            dataset = root.create_dataset(name, data=values, compression="gzip", shuffle=True, fletcher32=True)
+            dataset = root.create_dataset(name, data=values, compression="gzip", shuffle=True)
             unit = SI_UNITS.get(dimension_of(name) or "")
             if unit is not None:
                 dataset.attrs["unit"] = unit

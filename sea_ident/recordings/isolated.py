@@ -49,19 +49,19 @@ def read_isolated(reader: str, path: Path, memory_limit: int) -> RawTable:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired as error:
         raise RecordingError(f"{path}: reading took longer than {seconds:.0f} s; the file is damaged") from error
-    head, _, samples = done.stdout.partition(b"\n")
-    if done.returncode != 0 or not head:
+    end = done.stdout.find(b"\n")
+    if done.returncode != 0 or end < 0:
         why = done.stderr.decode(errors="replace").strip().splitlines()
         raise RecordingError(
             f"{path}: the library that reads {path.suffix.lower()} files ended with status {done.returncode}"
             f"{': ' + why[-1][:200] if why else ''}. The file is damaged"
         )
-    answer = json.loads(head)
+    answer = json.loads(done.stdout[:end])
     if "error" in answer:
         raise RecordingError(answer["error"])
     for text in answer["warnings"]:
         warnings.warn(text, stacklevel=2)
-    values = np.frombuffer(samples, dtype=np.float64)
+    values = np.frombuffer(done.stdout, dtype=np.float64, offset=end + 1)
     stops = np.cumsum(answer["sizes"], dtype=np.int64)
     columns = dict(zip(answer["names"], np.split(values, stops[:-1]), strict=True)) if answer["names"] else {}
     return RawTable(columns, left_out=tuple(answer["left_out"]))

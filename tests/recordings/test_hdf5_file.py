@@ -69,13 +69,13 @@ def test_data_in_other_files_is_refused(path, tmp_path):
         read_recording(path)
 
 
-@pytest.mark.parametrize("options", [{}, {"chunks": (2**20,)}])
-def test_claims_beyond_the_limit_are_refused_before_reading(path, options):
+@pytest.mark.parametrize(("shape", "chunks"), [((2**40,), (1024,)), ((2**20, 2**20), (1, 1024)), ((5,), (2**28,))])
+def test_claims_beyond_the_limit_are_refused_before_reading(path, shape, chunks):
     with h5py.File(path, "r+") as file:
-        file.create_dataset("q_knee", (2**40,), dtype="f8", chunks=options.get("chunks", (1024,)))
+        file.create_dataset("q_knee", shape, maxshape=(None,) * len(shape), dtype="f8", chunks=chunks)
     assert path.stat().st_size < 100_000
     with pytest.raises(RecordingError, match="over the limit"):
-        read_recording(path)
+        read_recording(path, memory_limit=2**30)
 
 
 def test_changed_data_is_noticed(tmp_path):

@@ -113,6 +113,13 @@ def test_a_crash_inside_a_library_is_an_error_like_any_other(tmp_path):
         read_recording(path)
 
 
+def test_a_reader_that_ends_its_process_is_told_from_one_that_refuses(tmp_path, monkeypatch):
+    write_recording(sample_recording(), tmp_path / "x.h5")
+    monkeypatch.setattr(isolated, "_START", "import sys; sys.exit('no way')")
+    with pytest.raises(SeaIdentError, match="ended with status 1: no way"):
+        read_recording(tmp_path / "x.h5")
+
+
 def test_a_reader_that_hangs_is_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(isolated, "_SECONDS", 0.0)
     write_recording(sample_recording(), tmp_path / "x.h5")
