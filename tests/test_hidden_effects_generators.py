@@ -30,7 +30,6 @@ from tests.benchmarks.hidden_effects.draw import draw_case
 from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
-from tests.benchmarks.hidden_effects.table import wilson
 from tests.benchmarks.hidden_effects.trajectories import draw_trajectory
 
 SMOOTHING = 0.02
@@ -238,8 +237,3 @@ def test_cases_follow_from_their_seed_and_survive_json() -> None:
     assert case == draw_case(11, "none", 2)
     assert case != draw_case(12, "none", 2)
     assert Case.from_dict(case.to_dict()) == case
-
-
-def test_wilson_interval_matches_the_published_example() -> None:
-    """Newcombe, Statistics in Medicine 17, 1998: 81 of 263 gives 0.2553 to 0.3662."""
-    np.testing.assert_allclose(wilson(81, 263), (0.2553, 0.3662), atol=5e-5)

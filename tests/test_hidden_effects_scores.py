@@ -1,0 +1,113 @@
+"""Scores of the hidden-effect benchmark: right, wrong and half-right diagnoses are told apart."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", reason="the cases of the benchmark are drawn with MuJoCo")
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from tests.benchmarks.hidden_effects.case import Case, Planted
+from tests.benchmarks.hidden_effects.diagnose_case import without_effects
+from tests.benchmarks.hidden_effects.draw import draw_case
+from tests.benchmarks.hidden_effects.generate import case_folder, generate, truth_file
+from tests.benchmarks.hidden_effects.scoring import Score, score_case
+from tests.benchmarks.hidden_effects.table import lines_of, wilson, write_report
+
+RIPPLE = Planted("torque_ripple", "knee", "library", 0.1, {"order": 5.0, "phase": 0.3}, gap=0.02, torque_share=0.02)
+
+
+def scored(root: Path, planted: tuple[Planted, ...], diagnosis: dict, row: str = "one", index: int = 0) -> Score:
+    case = replace(draw_case(1, "none", 0), row=row, index=index, planted=planted, robot="exo_leg")
+    for path, record in (
+        (truth_file(root, case.label), case.to_dict()),
+        (case_folder(root, case.label) / "diagnosis.json", diagnosis),
+    ):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(record))
+    score = score_case(root, truth_file(root, case.label))
+    assert score is not None
+    return score
+
+
+def said(*names: tuple[str, str], verdict: str = "named", alternatives: tuple[tuple[str, str], ...] = ()) -> dict:
+    other = [{"effect": effect, "joint": joint, "cos2": 0.9} for effect, joint in alternatives]
+    missing = [{"effect": e, "joint": j, "torque_share": 0.02, "alternatives": other} for e, j in names]
+    return {"verdict": verdict, "missing": missing, "seconds": 1.0}
+
+
+def test_right_name_at_right_joint(tmp_path: Path) -> None:
+    score = scored(tmp_path, (RIPPLE,), said(("torque_ripple", "knee")))
+    assert score.finder(RIPPLE) is not None
+    assert not score.false()
+
+
+@pytest.mark.parametrize("name", [("torque_ripple", "hip"), ("torque_offset", "knee")])
+def test_wrong_joint_and_wrong_effect_are_false(tmp_path: Path, name: tuple[str, str]) -> None:
+    score = scored(tmp_path, (RIPPLE,), said(name))
+    assert score.finder(RIPPLE) is None
+    assert len(score.false()) == 1
+
+
+def test_declared_alternatives_cover_but_do_not_name(tmp_path: Path) -> None:
+    score = scored(tmp_path, (RIPPLE,), said(("torque_offset", "knee"), alternatives=(("torque_ripple", "knee"),)))
+    assert score.finder(RIPPLE) is None
+    assert score.coverer(RIPPLE) is not None
+    assert not score.false_beyond_sets()
+
+
+def test_two_effects_of_equal_data_count_as_one_at_the_last_joint_only(tmp_path: Path) -> None:
+    for joint, equal in (("ankle", True), ("knee", False)):
+        planted = replace(RIPPLE, effect="spring_offset", joint=joint)
+        score = scored(tmp_path, (planted,), said(("encoder_offset", joint)))
+        assert (score.finder(planted) is not None) is equal
+
+
+def test_nothing_missing_and_failed_diagnoses(tmp_path: Path) -> None:
+    assert not scored(tmp_path, (RIPPLE,), {"verdict": "none", "missing": []}).seen
+    assert scored(tmp_path, (RIPPLE,), {"error": "broken"}).verdict == "error"
+
+
+def test_table_counts_and_marks_goals(tmp_path: Path) -> None:
+    scores = [scored(tmp_path, (RIPPLE,), said(("torque_ripple", "knee")), index=k) for k in range(3)]
+    scores += [scored(tmp_path, (RIPPLE,), said(("torque_ripple", "hip")), index=3)]
+    scores += [scored(tmp_path, (), {"verdict": "none", "missing": []}, row="none")]
+    lines = {(line.row, line.what): line for line in lines_of(scores)}
+    named = lines[("one", "effect and joint named")]
+    assert (named.successes, named.trials, named.met) == (3, 4, False)
+    assert lines[("one", "false names with confidence")].successes == 1
+    assert lines[("none", "something named, P = 20")].met
+    text = write_report(tmp_path)
+    assert "3/4 = 75.0 %" in text
+    assert (tmp_path / "confusion.png").stat().st_size > 1000
+    assert "torque_ripple @ hip" in (tmp_path / "misses.txt").read_text()
+
+
+def test_the_folder_of_a_case_holds_nothing_of_the_truth(tmp_path: Path) -> None:
+    case = replace(draw_case(1, "none", 2), period=4.0, periods=2, holdout_periods=1, planted=(RIPPLE,))
+    generate(case, tmp_path)
+    folder = case_folder(tmp_path, case.label)
+    assert {p.name for p in folder.iterdir()} <= {
+        "robot.urdf", "annotation.urdf", "joints.json", "train.npz", "holdout.npz",
+    }  # fmt: skip
+    for path in folder.iterdir():
+        assert b"ripple" not in path.read_bytes()
+    assert Case.from_dict(json.loads(truth_file(tmp_path, case.label).read_text())) == case
+
+
+def test_an_effect_can_be_taken_out_of_the_library() -> None:
+    import sea_ident.effects as effects
+
+    with without_effects(["torque_ripple"]):
+        assert "torque_ripple" not in effects.effect_classes()
+        assert "torque_offset" in effects.effect_classes()
+    assert "torque_ripple" in effects.effect_classes()
+
+
+def test_wilson_interval_matches_the_published_example() -> None:
+    """Newcombe, Statistics in Medicine 17, 1998: 81 of 263 gives 0.2553 to 0.3662."""
+    np.testing.assert_allclose(wilson(81, 263), (0.2553, 0.3662), atol=5e-5)
