@@ -83,13 +83,154 @@ def test_ctrl_c_ends_with_130_and_no_trace():
         "def slow(*_):\n    print('started', flush=True)\n    time.sleep(60)\n"
         "robot.load_robot = slow\nsys.argv = ['sea-ident', 'inspect', 'exo_leg']\nmain()\n"
     )
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "started\n"
-    time.sleep(0.05)
-    process.send_signal(2)
-    _, errors = process.communicate(timeout=30)
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "started\n"
+        time.sleep(0.05)
+        process.send_signal(2)
+        _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Traceback" not in errors
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory) -> tuple[Path, dict[str, dict]]:
+    """The whole chain through the command line, with what every verb answered."""
+    folder = tmp_path_factory.mktemp("chain")
+    said = {
+        "excite": call_json(
+            "excite", "exo_leg", "--out", folder / "exc.json", "--starts", 1, "--harmonics", 4, "--base-frequency", 0.2
+        ),
+        "simulate": call_json(
+            "simulate", "exo_leg", "--excitation", folder / "exc.json", "--periods", 7, "--out", folder / "rec.csv"
+        ),
+        "identify": call_json(
+            "identify", "exo_leg", folder / "rec.csv", "--period", 5, "--out", folder / "model.json",
+            "--report", folder / "model.html",
+        ),
+        "validate": call_json("validate", folder / "model.json", folder / "rec.csv"),
+        "export": call_json(
+            "export", folder / "model.json", "--urdf", folder / "out.urdf", "--mjcf", folder / "out.xml"
+        ),
+        "report": call_json(
+            "report", folder / "model.json", "--out", folder / "again.html", "--excitation", folder / "exc.json"
+        ),
+    }  # fmt: skip
+    return folder, said
+
+
+def test_excite_answers_with_margins_inside_all_limits(chain):
+    folder, said = chain
+    record = said["excite"]
+    assert {"hip.position", "knee.velocity", "ankle.acceleration", "hip_knee_sum"} <= set(record["margins"])
+    assert all(margin >= 0.0 for margin in record["margins"].values())
+    assert record["starts"] == 1
+    assert record["files"] == [str(folder / "exc.json")]
+
+
+def test_simulate_writes_the_columns_that_identify_reads(chain):
+    folder, said = chain
+    header = (folder / "rec.csv").read_text().partition("\n")[0].split(",")
+    assert header == said["simulate"]["columns"]
+    assert said["simulate"]["samples"] == 7 * 5 * 200
+    assert {f"{kind}_{joint}" for kind in ("q", "theta", "current") for joint in ("hip", "knee", "ankle")} <= set(
+        header
+    )
+
+
+def test_identify_finds_the_leg_that_was_simulated(chain):
+    folder, said = chain
+    model = json.loads((folder / "model.json").read_text())
+    assert {key: said["identify"][key] for key in model} == model
+    found = {parameter["name"]: parameter for parameter in model["base_parameters"]}
+    shank = found["shank.Iyy*"]
+    assert shank["value"] == pytest.approx(0.4052857, rel=0.05)
+    assert shank["relative_std_percent"] == pytest.approx(100 * shank["std"] / shank["value"])
+    assert {spring["joint"]: spring["verdict"] for spring in model["springs"]}["hip"] == "stiffening"
+    assert (folder / "model.html").stat().st_size > 50_000
+
+
+def test_validate_answers_per_joint(chain):
+    record = chain[1]["validate"]
+    for key in ("rms", "noise_std", "nrms"):
+        assert set(record[key]) == {"hip", "knee", "ankle"}
+    assert max(record["nrms"].values()) < 0.2
+
+
+def test_an_exported_robot_is_a_robot_again(chain):
+    folder = chain[0]
+    record = call_json("inspect", folder / "out.urdf")
+    assert [joint["name"] for joint in record["joints"]] == ["hip", "knee", "ankle"]
+    assert record["rank"] == 16
+
+
+def test_a_report_needs_the_model_file_only(chain):
+    text = (chain[0] / "again.html").read_text()
+    assert 'id="excitation"' in text
+    assert 'id="torque"' in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("identify", "exo_leg", "bad.csv", "--out", "never.json"), "nan"),
+        (("identify", "exo_leg", "rec.csv", "--period", "500", "--out", "never.json"), "period"),
+        (("identify", "emps", "rec.csv", "--out", "never.json"), "slider"),
+        (("identify", "exo_leg", "rec.csv", "--out", "no/never.json"), "does not exist"),
+        (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--report", "never.json"), "two outputs"),
+        (("simulate", "exo_leg", "--excitation", "model.json", "--out", "never.csv"), "not an excitation"),
+        (("excite", "exo_leg", "--out", "never.json", "--harmonics", "0"), "harmonics"),
+        (("validate", "exc.json", "rec.csv"), "exc.json"),
+        (("report", "rec.csv", "--out", "never.html"), "rec.csv"),
+        (("export", "model.json"), "--urdf"),
+        (("batch", "nowhere", "--robot", "exo_leg"), "no such folder"),
+    ],
+)
+def test_bad_input_names_the_culprit_and_writes_nothing(chain, arguments, expected):
+    folder = chain[0]
+    (folder / "bad.csv").write_text("time,q_hip\n0,0\n1,nan\n")
+    before = sorted(folder.iterdir())
+    done = call(*arguments, cwd=folder)
+    assert done.returncode == 2, done.stderr
+    assert expected in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert sorted(folder.iterdir()) == before
+
+
+def test_ctrl_c_while_a_file_is_written_leaves_none(chain, tmp_path):
+    program = (
+        "import os, time\nfrom sea_ident.cli import main\n"
+        "def stuck(*_):\n    print('writing', flush=True)\n    time.sleep(60)\n"
+        "os.fsync = stuck\nmain()\n"
+    )
+    arguments = ["identify", "exo_leg", str(chain[0] / "rec.csv"), "--period", "5", "--out", str(tmp_path / "m.json")]
+    with subprocess.Popen(
+        [sys.executable, "-c", program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "writing\n"
+        assert len(list(tmp_path.iterdir())) == 1  # the temporary file
+        process.send_signal(2)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_batch_goes_past_a_bad_recording(chain, tmp_path):
+    (tmp_path / "good.csv").write_bytes((chain[0] / "rec.csv").read_bytes())
+    (tmp_path / "bad.csv").write_text("time,q_hip\n0,0\n1,nan\n")
+    record = call_json("batch", tmp_path, "--robot", "exo_leg", "--period", 5, "--jobs", 1)
+    assert record["recordings"] == 2
+    assert record["failed"] == 1
+    assert [row["done"] for row in record["rows"]] == [False, True]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_offered_for_shells(shell):
+    program = f"import os; os.environ['_SEA_IDENT_COMPLETE'] = 'source_{shell}'\nfrom sea_ident.cli import main\nmain()"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert "sea-ident" in done.stdout
+    assert "_SEA_IDENT_COMPLETE" in done.stdout

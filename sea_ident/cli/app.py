@@ -64,8 +64,8 @@ def main() -> None:
     warnings.simplefilter("once", SeaIdentWarning)
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     # A polite kill unwinds like Ctrl-C, so that temporary files are removed.
-    for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     try:
         app(prog_name="sea-ident")
     except SeaIdentError as error:

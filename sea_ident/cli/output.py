@@ -5,10 +5,10 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from sea_ident.exceptions import SeaIdentError
 
@@ -83,12 +83,19 @@ def check_targets(*targets: Path | None) -> None:
         seen.add(target.resolve())
 
 
-def _silent(done: int, what: str | None = None) -> None:
+class Tell(Protocol):
+    """How a verb says how far it is."""
+
+    def __call__(self, done: int, what: str | None = None, total: int | None = None) -> None:
+        """So many steps are done; what is being done now; of how many, where that has changed."""
+
+
+def _silent(done: int, what: str | None = None, total: int | None = None) -> None:
     """Progress where nobody watches."""
 
 
 @contextmanager
-def progress(description: str, total: int | None = None) -> Iterator[Callable[[int, str | None], None]]:
+def progress(description: str, total: int | None = None) -> Iterator[Tell]:
     """A progress bar with the time left, on standard error where that is a terminal.
 
     Args:
@@ -96,7 +103,7 @@ def progress(description: str, total: int | None = None) -> Iterator[Callable[[i
         total: number of steps; None where it is not known, which shows the time passed only.
 
     Yields:
-        Function to call with the number of steps done so far, and what is being done now or None.
+        Function to call with the number of steps done so far.
     """
     if not sys.stderr.isatty():
         yield _silent
@@ -113,7 +120,7 @@ def progress(description: str, total: int | None = None) -> Iterator[Callable[[i
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(description, total=total)
 
-        def update(done: int, what: str | None = None) -> None:
-            bar.update(task, completed=done, description=what or description)
+        def update(done: int, what: str | None = None, total: int | None = None) -> None:
+            bar.update(task, completed=done, description=what or description, total=total)
 
         yield update
