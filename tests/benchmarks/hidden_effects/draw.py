@@ -115,16 +115,7 @@ def draw_case(seed: int, row: str, index: int) -> Case:
         channel="current" if rng.random() < 0.25 else "tau_motor",
         friction_form=form,
         friction_smoothing=_log(rng, 0.003, 0.02),
-        noise=Noise(
-            link_encoder=_log(rng, 5e-6, 4e-5),
-            motor_encoder=_log(rng, 2e-6, 1.5e-5),
-            link_step=2.0 * np.pi / 2.0 ** float(rng.integers(18, 21)),
-            motor_step=2.0 * np.pi / 2.0 ** float(rng.integers(18, 22)),
-            torque=_log(rng, 0.003, 0.02),
-            actuator=_log(rng, 0.0005, 0.003),
-            jitter=_log(rng, 0.02, 0.2),
-            jitter_speed=_log(rng, 0.03, 0.1),
-        ),
+        noise=_noise(rng),
         planted=(),
         reference=row == "reference",
     )
@@ -136,6 +127,25 @@ def draw_case(seed: int, row: str, index: int) -> Case:
         case = replace(case, engine="project")
     forbidden = tuple(p.effect for p in planted) if row == "removed" else ()
     return replace(case, planted=planted, forbidden=forbidden)
+
+
+def _noise(rng: np.random.Generator) -> Noise:
+    link, motor = _log(rng, 5e-6, 4e-5), _log(rng, 2e-6, 1.5e-5)
+    return Noise(
+        link_encoder=link,
+        motor_encoder=motor,
+        link_step=_encoder_step(link),
+        motor_step=_encoder_step(motor),
+        torque=_log(rng, 0.003, 0.02),
+        actuator=_log(rng, 0.0005, 0.003),
+        jitter=_log(rng, 0.02, 0.2),
+        jitter_speed=_log(rng, 0.03, 0.1),
+    )
+
+
+def _encoder_step(noise: float) -> float:
+    """Largest step of a binary encoder that its noise still spreads over neighbouring counts."""
+    return float(2.0 * np.pi / 2.0 ** np.ceil(np.log2(2.0 * np.pi / (1.5 * noise))))
 
 
 def friction_without_jitter(case: Case) -> Friction:
