@@ -48,7 +48,7 @@ class SmoothCoulomb(FrictionLaw):
         smoothing: v_off [rad/s] or [m/s].
     """
 
-    smoothing: float = 0.005
+    smoothing: float = 0.008
 
     def __post_init__(self) -> None:
         if not self.smoothing > 0.0:
@@ -132,8 +132,8 @@ class FrictionJitter:
         speed: v_j, speed up to which it acts [rad/s] or [m/s].
     """
 
-    spread: float = 0.3
-    speed: float = 0.05
+    spread: float = 0.5
+    speed: float = 0.1
 
     def __post_init__(self) -> None:
         if self.spread < 0.0 or not self.speed > 0.0:
