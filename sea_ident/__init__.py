@@ -31,6 +31,9 @@ _HOME = {
     "read_model": "estimation",
     "Validation": "validation",
     "validate": "validation",
+    "identify_batch": "batch",
+    "run_demo": "demo",
+    "write_report": "report",
     "export_mjcf": "export",
     "export_urdf": "export",
     "SeaIdentError": "exceptions",
@@ -57,19 +60,24 @@ __all__ = [
     "export_urdf",
     "find_base_parameters",
     "identify",
+    "identify_batch",
     "identify_springs",
     "load_robot",
     "process",
     "read_excitation",
     "read_model",
     "read_recording",
+    "run_demo",
     "simulate",
     "validate",
     "write_recording",
+    "write_report",
 ]
 
 if TYPE_CHECKING:
     from sea_ident.base_parameters import find_base_parameters
+    from sea_ident.batch import identify_batch
+    from sea_ident.demo import run_demo
     from sea_ident.estimation import Model, identify, identify_springs, read_model
     from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
     from sea_ident.excitation import Excitation, design_excitation, read_excitation
@@ -78,6 +86,7 @@ if TYPE_CHECKING:
     from sea_ident.processing import ProcessedRecording, process
     from sea_ident.recordings import ClockAlignment, ColumnSource, Recording, read_recording, write_recording
     from sea_ident.regressor import build_regressor
+    from sea_ident.report import write_report
     from sea_ident.robot import Robot, load_robot
     from sea_ident.simulation import Simulation, simulate
     from sea_ident.validation import Validation, validate
