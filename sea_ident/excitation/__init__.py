@@ -11,9 +11,11 @@ from sea_ident.excitation.criteria import (
 )
 from sea_ident.excitation.design import design_excitation
 from sea_ident.excitation.design_model import reduced_effects
+from sea_ident.excitation.ramp import Ramp, RampMotion
 from sea_ident.excitation.result import Excitation, read_excitation
 from sea_ident.excitation.springs import PredictedMotors
 from sea_ident.excitation.starts import Progress
+from sea_ident.excitation.trajectory import sample_trajectory, write_trajectory_csv
 
 __all__ = [
     "AOptimality",
@@ -25,8 +27,12 @@ __all__ = [
     "Excitation",
     "PredictedMotors",
     "Progress",
+    "Ramp",
+    "RampMotion",
     "Scaling",
     "design_excitation",
     "read_excitation",
     "reduced_effects",
+    "sample_trajectory",
+    "write_trajectory_csv",
 ]

@@ -51,6 +51,10 @@ class Criterion(ABC):
         """The number by which designs of this criterion are compared."""
         return self.value(matrix)
 
+    def describe(self) -> str:
+        """Its name, with what it is about."""
+        return self.name
+
 
 @dataclass(frozen=True)
 class SpectralCriterion(Criterion):
@@ -255,6 +259,11 @@ class Discrimination(Criterion):
     against: tuple[Effect, ...] = ()
 
     name: ClassVar[str] = "discrimination"
+
+    def describe(self) -> str:
+        """Which effect it tells from which."""
+        others = ", ".join(effect.parameter_name() for effect in self.against)
+        return f"{self.name} of {self.target.parameter_name()} from {others or 'the model'}"
 
     def bind(self, columns: int) -> "BoundDiscrimination":
         """For information matrices whose last `columns` belong to the target."""

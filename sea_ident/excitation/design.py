@@ -13,6 +13,7 @@ from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.defaults import default_limits
 from sea_ident.excitation.design_model import design_model, reduced_effects
 from sea_ident.excitation.problem import Problem
+from sea_ident.excitation.ramp import Ramp
 from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.springs import PredictedMotors
 from sea_ident.excitation.starts import Progress, climb_from_starts
@@ -35,6 +36,7 @@ def design_excitation(
     information: FloatArray | None = None,
     noise: FloatArray | None = None,
     start: FloatArray | None = None,
+    ramp: Ramp | None = None,
     jobs: int = 2,
     progress: Callable[[Progress], None] | None = None,
 ) -> Excitation:
@@ -56,6 +58,7 @@ def design_excitation(
         noise: (n,) standard deviation of the torque noise of each joint [N m]; 1 by default. With `motors`, (2 n,) may
             be given: links first, then motors.
         start: (n, 2 L + 1) coefficients of a further start; it is moved inside the limits if it is outside.
+        ramp: ask for ramps between rest and the periodic motion, inside the same limits; none by default.
         jobs: starts that are climbed at the same time; the result does not depend on it.
         progress: called after every step.
 
@@ -92,7 +95,9 @@ def design_excitation(
         notes.append("interrupted; this is the best so far")
     for note in notes:
         python_warnings.warn(note, SeaIdentWarning, stacklevel=2)
-    return problem.result(found.coefficients, starts, found.values, seed, time.perf_counter() - begin, tuple(notes))
+    ramps = (None, None) if ramp is None else problem.ramps(found.coefficients, ramp)
+    seconds = time.perf_counter() - begin
+    return problem.result(found.coefficients, ramps, starts, found.values, seed, seconds, tuple(notes))
 
 
 def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> FloatArray:

@@ -1,6 +1,6 @@
 """Limits on motor torque and spring deflection: nonlinear in the motion, through the robot's prior parameters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,13 +54,17 @@ class DynamicLimits:
     def __len__(self) -> int:
         return len(self.names)
 
+    def tightened(self, part: float) -> "DynamicLimits":
+        """The limits with a part of each taken off."""
+        return replace(self, bound=(1.0 - part) * self.bound)
+
     @cached_property
     def _bodies(self) -> BodyColumns:
         return BodyColumns.torque(self.robot.extended_model)
 
     @cached_property
-    def _fold(self) -> FloatArray:
-        """(nv, r) from coordinates to limits."""
+    def fold(self) -> FloatArray:
+        """(nv, r) from torques of coordinates of the extended model to those that are limited."""
         robot = self.robot
         both = robot.link_map + robot.motor_map
         return np.where(self.springs[None, :], robot.link_map[:, self.rows], both[:, self.rows])
@@ -78,11 +82,11 @@ class DynamicLimits:
         robot, n = self.robot, self.robot.n
         both = robot.link_map + robot.motor_map
         bodies = self._bodies.at(both @ motion.q.T + robot.offset[:, None], both @ motion.dq.T, both @ motion.ddq.T)
-        torque = bodies.columns()[:, 0].T @ self._fold
+        torque = bodies.columns()[:, 0].T @ self.fold
         slopes = np.zeros((len(motion), len(self), 3 * n if derivatives else 0))
         if derivatives:
             nv = both.shape[0]
-            folded = np.swapaxes(bodies.slopes()[:, :, 0], 1, 2) @ self._fold  # (N, 3 nv, r)
+            folded = np.swapaxes(bodies.slopes()[:, :, 0], 1, 2) @ self.fold  # (N, 3 nv, r)
             for k in range(3):
                 slopes[:, :, k * n : (k + 1) * n] = np.swapaxes(both.T @ folded[:, k * nv : (k + 1) * nv], 1, 2)
         for friction in self.friction:
@@ -97,6 +101,28 @@ class DynamicLimits:
                     if part is not None:
                         slopes[:, places, block * n + i] += (part @ friction.values)[:, None]
         return torque, slopes
+
+    def friction_rise(self, motion: Motion, faster: FloatArray) -> FloatArray:
+        """How much friction can rise when every joint turns faster.
+
+        Args:
+            motion: (N, n) motion.
+            faster: (n,) how much [rad/s].
+
+        Returns:
+            (N, r) torques.
+        """
+        rise = np.zeros((len(motion), len(self)))
+        for friction in self.friction:
+            i = friction.joint
+            places = np.flatnonzero((self.rows == i) & (friction.link | ~self.springs.astype(bool)))
+            now, still = np.abs(motion.dq[:, i]), np.zeros(len(motion))
+            then = now + faster[i]
+            values = [friction.effect.local_columns(still, v, still, v) @ friction.values for v in (now, then)]
+            # where the sign may turn within the step, the whole of it is taken
+            jump = np.where(now < faster[i], values[0] + values[1], values[1] - values[0])
+            rise[:, places] += jump[:, None]
+        return rise
 
 
 def dynamic_limits(robot: Robot, limits: Limits, notes: list[str]) -> DynamicLimits:

@@ -8,11 +8,13 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, make_effect
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.criteria import Criterion, log_det
+from sea_ident.excitation.curvature_bounds import MotionBounds, proven_margins
 from sea_ident.excitation.design_model import DesignModel
 from sea_ident.excitation.dynamic_limits import DynamicLimits, dynamic_limits
 from sea_ident.excitation.feasibility import at_rest, comfortable_position, shrink
 from sea_ident.excitation.information import Information
 from sea_ident.excitation.linear_limits import LinearLimits, linear_limits
+from sea_ident.excitation.ramp import Ramp, RampMotion, design_ramp, design_ramp_out
 from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.states import Sampling
 from sea_ident.excitation.walls import DynamicWall, LinearWall, Wall
@@ -22,7 +24,8 @@ from sea_ident.robot import Limits, Robot
 # points of the walls' grids per harmonic
 _LINEAR_POINTS = 32
 _DYNAMIC_POINTS = 16
-_CHECK_POINTS = 200
+# part of torque limits left free for what a proof for all times takes
+_RESERVE = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +78,9 @@ class Problem:
         frequency, harmonics = sampling.base_frequency, sampling.harmonics
         nonlinear: list[Wall] = []
         if len(dynamic):
-            nonlinear.append(DynamicWall.of(dynamic, frequency, harmonics, _DYNAMIC_POINTS * harmonics))
+            nonlinear.append(
+                DynamicWall.of(dynamic.tightened(_RESERVE), frequency, harmonics, _DYNAMIC_POINTS * harmonics)
+            )
         position = comfortable_position(
             linear, nonlinear, harmonics, dynamic.names, np.random.default_rng([seed, 2**31])
         )
@@ -122,16 +127,12 @@ class Problem:
         return self.criterion.value(information.matrix(coefficients))
 
     def margins(self, coefficients: FloatArray) -> FloatArray:
-        """(m,) smallest distance to each linear limit over all t, then to each dynamic limit."""
-        linear = self.limits.margins(self.series(coefficients))
-        if not len(self.dynamic):
-            return linear
-        points = _CHECK_POINTS * self.harmonics
-        wall = DynamicWall.of(self.dynamic, self.base_frequency, self.harmonics, points)
-        values = wall.values(coefficients)
-        below, above = wall.overshoot(values)
-        room = np.minimum(values - below - wall.lower, wall.upper - values - above).min(axis=1)
-        return np.concatenate([linear, room])
+        """(m,) smallest distance to each linear limit over all t, then what each dynamic limit is proven to keep."""
+        series = self.series(coefficients)
+        linear = self.limits.margins(series)
+        return np.concatenate(
+            [linear, proven_margins(self.dynamic, series.motion, series.period, MotionBounds.of(series))]
+        )
 
     def settle(self, coefficients: FloatArray) -> FloatArray:
         """Shrink a trajectory toward rest by the little that it takes to be inside for all t."""
@@ -142,15 +143,37 @@ class Problem:
             if exact < 1.0:
                 factor *= exact * (1.0 - 1e-13)
                 continue
-            worst = float(self.margins(trial).min(initial=0.0))
-            if worst >= 0.0:
+            margins = self.margins(trial)
+            if float(margins.min(initial=0.0)) >= 0.0:
                 return trial
-            factor *= 1.0 - 1e-4 if worst > -1e-3 else 1.0 - 1e-2
+            beyond = -margins[len(self.limits) :] / self.dynamic.bound
+            factor *= 1.0 - max(1e-5, 0.5 * float(beyond.max(initial=0.0)))
         return self.centre
+
+    def ramps(self, coefficients: FloatArray, ramp: Ramp) -> tuple[RampMotion, RampMotion]:
+        """From rest into a trajectory, and back to rest.
+
+        Raises:
+            InfeasibleError: none was found inside the limits.
+        """
+        series, rest = self.series(coefficients), self.centre[:, -1]
+        duration = 0.5 * series.period if ramp.duration is None else ramp.duration
+        if not (np.isfinite(duration) and duration > 0.0):
+            raise ExcitationError(f"the duration of the ramp is {duration} s; it must be positive")
+        return (
+            design_ramp(series, self.limits, duration, rest, self._allows),
+            design_ramp_out(series, self.limits, duration, rest, self._allows),
+        )
+
+    def _allows(self, ramp: RampMotion) -> bool:
+        """Whether a ramp keeps the limits that are not linear."""
+        margins = proven_margins(self.dynamic, ramp.motion, ramp.duration, MotionBounds.of_ramp(ramp))
+        return float(margins.min(initial=0.0)) >= 0.0
 
     def result(
         self,
         coefficients: FloatArray,
+        ramps: tuple[RampMotion | None, RampMotion | None],
         starts: int,
         values: tuple[float, ...],
         seed: int,
@@ -170,7 +193,7 @@ class Problem:
             series=self.series(coefficients),
             joint_names=self.robot.joint_names,
             robot=self.robot.source,
-            criterion=self.criterion.name,
+            criterion=self.criterion.describe(),
             value=self.criterion.reported(matrix),
             log_det=log_det(matrix),
             condition_number=float(np.sqrt(normalised[-1] / normalised[0])),
@@ -183,6 +206,8 @@ class Problem:
             start_values=values,
             seed=seed,
             seconds=seconds,
+            ramp_in=ramps[0],
+            ramp_out=ramps[1],
             warnings=notes,
         )
 

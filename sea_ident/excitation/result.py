@@ -11,6 +11,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.atomic import atomic_file
 from sea_ident.exceptions import ExcitationError, OutputError
+from sea_ident.excitation.ramp import RampMotion
 from sea_ident.motion import FourierSeries
 
 FORMAT = "sea_ident excitation"
@@ -38,6 +39,8 @@ class Excitation:
         start_values: criterion that each start reached.
         seed: of the random starts.
         seconds: time that the design took [s].
+        ramp_in: motion from rest into the periodic one, None where none was asked for.
+        ramp_out: motion from the periodic one to rest.
         warnings: what a user should know.
     """
 
@@ -57,6 +60,8 @@ class Excitation:
     start_values: tuple[float, ...]
     seed: int
     seconds: float
+    ramp_in: RampMotion | None = None
+    ramp_out: RampMotion | None = None
     warnings: tuple[str, ...] = ()
 
     @property
@@ -82,6 +87,8 @@ class Excitation:
         for name, margin in self.margins.items():
             lower, upper = self.limits[name]
             lines.append(f"  {name:<{width}}  [{lower:.5g}, {upper:.5g}]  margin {margin:.3g}")
+        if self.ramp_in is not None and self.ramp_out is not None:
+            lines.append(f"  ramps: {self.ramp_in.duration:g} s in, {self.ramp_out.duration:g} s out")
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
 
@@ -110,6 +117,8 @@ class Excitation:
             "start_values": list(self.start_values),
             "seed": self.seed,
             "seconds": self.seconds,
+            "ramp_in": None if self.ramp_in is None else self.ramp_in.to_dict(),
+            "ramp_out": None if self.ramp_out is None else self.ramp_out.to_dict(),
             "warnings": list(self.warnings),
         }
 
@@ -197,5 +206,7 @@ def _from_record(record: Mapping[str, Any], path: str | Path) -> Excitation:
         start_values=tuple(float(value) for value in record["start_values"]),
         seed=int(record["seed"]),
         seconds=float(record["seconds"]),
+        ramp_in=None if record["ramp_in"] is None else RampMotion.from_dict(record["ramp_in"], n),
+        ramp_out=None if record["ramp_out"] is None else RampMotion.from_dict(record["ramp_out"], n),
         warnings=tuple(str(text) for text in record["warnings"]),
     )

@@ -170,8 +170,8 @@ def _singular(problem: Problem, information: Information, point: FloatArray) -> 
     _, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     hidden = [problem.model.names[int(k)] for k in np.argsort(-np.abs(vectors[:, 0]))[:3]]
     return (
-        f"no trajectory was found that shows all {len(matrix)} parameters; least visible: {', '.join(hidden)}. Take more "
-        f"harmonics, wider limits, or fewer effects"
+        f"no trajectory was found that shows all {len(matrix)} parameters; least visible: {', '.join(hidden)}. Take "
+        f"more harmonics, wider limits, or fewer effects"
     )
 
 
