@@ -75,7 +75,7 @@ def _draw(name: str, period: float, rng: np.random.Generator, weak: bool) -> Fou
         centre = (upper + lower) / 2.0 + np.maximum(slack, 0.0) * rng.uniform(-1.0, 1.0, n)
         offset = centre - scale * middle
         series = FourierSeries(1.0 / period, offset, a * scale[:, None], b * scale[:, None])
-        sums = series.evaluate(time) @ limits.combinations.T
+        sums = (offset + scale * shapes[0]) @ limits.combinations.T
         if np.all(sums >= limits.combination_lower) and np.all(sums <= limits.combination_upper):
             return series
         scale = scale * 0.985
