@@ -1,6 +1,6 @@
 """The working bench: models made of effects, fitted to one recording in its noise."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,10 +9,21 @@ import pinocchio as pin
 import scipy.linalg
 from numpy.typing import NDArray
 
-from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
+from sea_ident._typing import FloatArray, IntArray
+from sea_ident.discrepancy.data import EquationKind, PeriodData, free_samples, spectrum
 from sea_ident.discrepancy.noise import NoiseFloor, noise_from_periods, stacked
-from sea_ident.effects import Anchor, Column, Contribution, Effect, Shape, Side, State, corrected_motion
+from sea_ident.effects import (
+    Anchor,
+    Column,
+    Contribution,
+    Effect,
+    JointEffect,
+    Shape,
+    Side,
+    State,
+    corrected_motion,
+)
+from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.regressor import prior_parameters
@@ -22,8 +33,14 @@ ComplexArray = NDArray[np.complex128]
 PERIOD_SAMPLES = 2.5
 """Samples of a single period that its model torque is computed at, per harmonic compared."""
 
+MOST_FIT_STEPS = 6
+"""Largest number of steps of a fit; a model that is right needs two."""
+
 RANK_TOLERANCE = 1e-9
 """Singular directions of the normalised columns below this share of the largest are left out."""
+
+VARIANTS_KEPT = 3e8
+"""Bytes of columns of candidates that are kept for the next search."""
 
 SHAPES_THAT_STAY = {"spring_stiffening": ("exponent",), "external_force": ("start", "stop")}
 """Shape parameters that are not refined: they say which effect it is, or come from elsewhere."""
@@ -38,6 +55,7 @@ class Fit:
         columns: (p,) labels.
         values: (p,) parameters; where the data tell only combinations, as near to the priors as they let.
         residual: (H + 1, E) complex residual of the mean [N m].
+        scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
         basis: (M, r) orthonormal basis of everything that is free: columns, and tangents of the shapes.
         covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
@@ -48,6 +66,7 @@ class Fit:
     columns: tuple[Column, ...]
     values: FloatArray
     residual: ComplexArray
+    scale: FloatArray
     whitened: FloatArray
     basis: FloatArray
     covariance_factor: FloatArray
@@ -88,19 +107,24 @@ class Bench:
 
     Args:
         data: the recording.
+        effects: the model that is diagnosed.
     """
 
-    def __init__(self, data: PeriodData) -> None:
+    def __init__(self, data: PeriodData, effects: Sequence[Effect]) -> None:
         self.data = data
+        self.effects = tuple(effects)
         self.robot = data.robot
-        self._target = spectrum(data.target(data.tau_motor) * data.weight, data.harmonics)
+        self._target = spectrum(data.target(data.tau_motor), data.harmonics)
+        self._free = free_samples(data.left_out, data.harmonics)
+        self._free_basis: tuple[NoiseFloor | None, FloatArray] | None = None
         self._states: dict[tuple[Effect, ...], State] = {}
         self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
         stride = max(1, int(data.samples / (PERIOD_SAMPLES * data.harmonics)))
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
         self._period_targets = [
-            spectrum(data.target(tau) * data.weight, data.harmonics) for tau in data.period_tau_motor
+            spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor
         ]
+        self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
 
     # -- columns of the mean ---------------------------------------------------------------------------------------
@@ -125,22 +149,37 @@ class Bench:
             self._columns[key] = self._spectra(effect.evaluate(self.state(effects)), signals)
         return self._columns[key]
 
-    def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> ComplexArray:
-        """(H + 1, E, v, k) columns of one effect in all its variants, not kept."""
-        state, signals = self.state(effects), signal_effects(effects)
-        parts = [variant.evaluate(state) for variant in variants]
-        both = Contribution(np.stack([p.link for p in parts], 2), np.stack([p.motor for p in parts], 2))
-        return self._spectra(both, signals)
+    def variant_spectra(
+        self, variants: Sequence[Effect], effects: Sequence[Effect]
+    ) -> tuple[IntArray, ComplexArray]:
+        """Columns of one effect in all its variants.
 
-    def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
+        Returns:
+            (e,) equations that it touches, and (H + 1, e, v, k) columns in these.
+        """
+        signals = signal_effects(effects)
+        key = (tuple(variants), signals)
+        if key not in self._variants:
+            if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
+                self._variants.clear()
+            state = self.state(effects)
+            parts = [variant.evaluate(state) for variant in variants]
+            both = Contribution(np.stack([p.link for p in parts], 2), np.stack([p.motor for p in parts], 2))
+            self._variants[key] = self._touched(both, signals)
+        return self._variants[key]
+
+    def _touched(self, part: Contribution, signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
+        """Equations with anything in them, and the spectra (H + 1, e, ...) there."""
         for signal in signals:
             part = signal.shifted(self.robot, self.data.motion.time, part)
         rows = self.data.rows(part)
-        touched = [e for e in range(rows.shape[1]) if np.any(rows[:, e])]
-        out = np.zeros((self.data.harmonics + 1, *rows.shape[1:]), dtype=np.complex128)
-        if touched:
-            weight = self.data.weight[:, touched].reshape(len(rows), len(touched), *([1] * (rows.ndim - 2)))
-            out[:, touched] = spectrum(rows[:, touched] * weight, self.data.harmonics)
+        touched = np.array([e for e in range(rows.shape[1]) if np.any(rows[:, e])], dtype=np.intp)
+        return touched, spectrum(rows[:, touched], self.data.harmonics)
+
+    def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
+        touched, found = self._touched(part, signals)
+        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), *found.shape[2:]), dtype=np.complex128)
+        out[:, touched] = found
         return out
 
     def design(self, effects: Sequence[Effect]) -> ComplexArray:
@@ -157,25 +196,117 @@ class Bench:
 
     # -- fits --------------------------------------------------------------------------------------------------------
 
-    def fit(self, effects: Sequence[Effect], noise: NoiseFloor | None, *, tangents: bool = True) -> Fit:
-        """Fit the parameters of a model, its shapes held; without a noise floor all equations count alike."""
+    def fit(
+        self,
+        effects: Sequence[Effect],
+        noise: NoiseFloor | None,
+        *,
+        start: Mapping[str, float] | None = None,
+        tangents: bool = True,
+    ) -> Fit:
+        """Fit the parameters of a model, its shapes held.
+
+        A link equation has nothing on its right-hand side: smaller parameters always leave a smaller residual. So its
+        residual is measured in deflection, that is divided by the stiffness of its own fit (and multiplied by that of
+        the first fit, to stay a torque). The scale of the parameters then comes from the motor equations alone.
+
+        Args:
+            effects: the model.
+            noise: noise floor; without one all equations count alike, and no scale can go wrong.
+            start: parameters by name to start from; those of the unweighted fit by default.
+            tangents: whether shapes are free in what is said about degrees of freedom and covariance.
+
+        Returns:
+            The fit.
+        """
         effects = tuple(effects)
-        whitener = self.whitener(noise)
-        design = self.design(effects)
-        columns = self.labels(effects)
-        prior = np.nan_to_num(prior_parameters(self.robot, effects))
-        flat = stacked(np.matmul(whitener, design))
-        left = self._target - design @ prior
-        target = stacked(np.matmul(whitener, left[:, :, None])[:, :, 0])
-        change, basis, factor = solve(flat, target)
-        values = prior + change
-        residual = self._target - design @ values
+        columns, design, whitener = self.labels(effects), self.design(effects), self.whitener(noise)
+        free = self.free_basis(noise)
+        values = np.nan_to_num(prior_parameters(self.robot, effects))
+        if start is None and noise is not None:
+            start = self.fit(effects, None, tangents=False).parameters
+        if start is not None:
+            values = np.array([start.get(c.name, v if c.name in start else 0.0) for c, v in zip(columns, values, strict=True)])
+        cost, best = np.inf, None
+        step = np.zeros(0)
+        for _ in range(MOST_FIT_STEPS if noise is not None else 1):
+            residual = self._target - design @ values
+            scale = np.ones(len(self.data.equations)) if noise is None else self.link_scale(columns, values)
+            whitened = _off(free, whiten(whitener, residual * scale))
+            new_cost = float(whitened @ whitened)
+            if best is not None and new_cost > cost * (1.0 + 1e-9):
+                step *= 0.3
+                values = best[0] + step
+                continue
+            converged = best is not None and cost - new_cost < 1e-3 + 1e-6 * new_cost
+            cost, best = new_cost, (values, residual, scale, whitened)
+            if converged:
+                break
+            flat = self._scaled_columns(columns, values, design, residual, scale, noise)
+            step = solve(_off(free, whiten(whitener, flat)), whitened)[0]
+            values = values + step
+        if noise is None:
+            residual, scale = self._target - design @ values, np.ones(len(self.data.equations))
+            whitened = _off(free, whiten(whitener, residual))
+        else:
+            assert best is not None
+            values, residual, scale, whitened = best
+        flat = whiten(whitener, self._scaled_columns(columns, values, design, residual, scale, noise))
         shapes = free_shapes(effects) if tangents else ()
         if shapes:
-            directions = stacked(np.matmul(whitener, self.tangents(effects, columns, values, shapes)))
-            _, basis, factor = solve(np.concatenate([flat, directions], axis=1), target)
-        whitened = stacked(np.matmul(whitener, residual[:, :, None])[:, :, 0])
-        return Fit(effects, columns, values, residual, whitened, basis, factor, shapes)
+            directions = self.tangents(effects, columns, values, shapes) * scale[:, None]
+            flat = np.concatenate([flat, whiten(whitener, directions)], axis=1)
+        _, basis, factor = solve(_off(free, flat), whitened)
+        basis = np.concatenate([free, basis], axis=1)
+        return Fit(effects, columns, values, residual, scale, whitened, basis, factor, shapes)
+
+    def link_scale(self, columns: Sequence[Column], values: FloatArray) -> FloatArray:
+        """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
+        stiffness = {c.joint: float(v) for c, v in zip(columns, values, strict=True) if c.effect == "spring_stiffness"}
+        scale = np.ones(len(self.data.equations))
+        for e, equation in enumerate(self.data.equations):
+            first = self.first_fit.parameters.get(f"{equation.joint}.spring_stiffness", 0.0)
+            if equation.kind is EquationKind.LINK and first > 0.0 and equation.joint in stiffness:
+                scale[e] = first / max(stiffness[equation.joint], 0.02 * first)
+        return scale
+
+    def _scaled_columns(
+        self,
+        columns: Sequence[Column],
+        values: FloatArray,
+        design: ComplexArray,
+        residual: ComplexArray,
+        scale: FloatArray,
+        noise: NoiseFloor | None,
+    ) -> ComplexArray:
+        """(H + 1, E, p) decrease of the scaled residual with every parameter."""
+        out = design * scale[:, None]
+        if noise is None:
+            return out
+        for k, column in enumerate(columns):
+            if column.effect != "spring_stiffness" or values[k] == 0.0:
+                continue
+            for e, equation in enumerate(self.data.equations):
+                if equation.kind is EquationKind.LINK and equation.joint == column.joint:
+                    out[:, e, k] += scale[e] * residual[:, e] / values[k]
+        return out
+
+    @cached_property
+    def first_fit(self) -> Fit:
+        """The model that is diagnosed, all equations counting alike: no weight can pull its parameters to zero."""
+        return self.fit(self.effects, None, tangents=False)
+
+    def free_basis(self, noise: NoiseFloor | None) -> FloatArray:
+        """(M, m) orthonormal basis of the samples that are left out, whitened."""
+        if self._free_basis is None or self._free_basis[0] is not noise:
+            flat = whiten(self.whitener(noise), self._free)
+            self._free_basis = (noise, solve(flat, np.zeros(len(flat)))[1])
+        return self._free_basis[1]
+
+    def statistic(self, fit: Fit, noise: NoiseFloor) -> float:
+        """Weighted sum of squares of the residual of a fit in another noise floor, without fitting again."""
+        left = _off(self.free_basis(noise), whiten(noise.whitener(), fit.residual * fit.scale))
+        return float(left @ left)
 
     def whitener(self, noise: NoiseFloor | None) -> ComplexArray:
         """(H + 1, E, E) whitening of a noise floor."""
@@ -205,8 +336,12 @@ class Bench:
                 continue
             own = values[starts[position] : starts[position + 1]]
             low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
-            spectra = self.variant_spectra((low, high), effects)
-            out[:, :, k] = (spectra[:, :, 1] - spectra[:, :, 0]) @ own / 2e-3
+            state = self.state(effects)
+            parts = [e.evaluate(state) for e in (low, high)]
+            change = Contribution(
+                (parts[1].link - parts[0].link) @ own / 2e-3, (parts[1].motor - parts[0].motor) @ own / 2e-3
+            )
+            out[:, :, k] = self._spectra(change, signal_effects(effects))
         return out
 
     def signal_tangent(
@@ -221,7 +356,8 @@ class Bench:
         here = float(getattr(effect, amount.name))
         others = tuple(s for s in signals if s != effect)
         motions, rows = [], []
-        rest = [e for e in effects if e.name not in ("rigid_bodies", "rotor_inertia") and not is_signal(e)]
+        # what stands at another joint does not see this signal
+        rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
         for sign in (-1.0, 1.0):
             changed = (*others, replace(effect, **{amount.name: here + sign * step}))  # type: ignore[arg-type]
             motion = corrected_motion(self.robot, changed, self.data.motion)
@@ -265,44 +401,57 @@ class Bench:
             (ends[1].link - ends[0].link) / (2.0 * step), (ends[1].motor - ends[0].motor) / (2.0 * step)
         )
 
-    def refine(self, effects: Sequence[Effect], noise: NoiseFloor, *, rounds: int = 12) -> Fit:
-        """Fit parameters and shapes together: Gauss-Newton on the shapes, the parameters solved for in every step."""
-        fit = self.fit(self.anchored(effects, None), noise)
+    def refine(
+        self,
+        effects: Sequence[Effect],
+        noise: NoiseFloor,
+        *,
+        start: Mapping[str, float] | None = None,
+        only: int = 0,
+        rounds: int = 12,
+    ) -> Fit:
+        """Fit parameters and shapes together: Gauss-Newton on the shapes, the parameters solved for in every step.
+
+        Args:
+            effects: the model.
+            noise: noise floor.
+            start: parameters to start from.
+            only: position from which on shapes are refined; those before keep theirs, for a quick look.
+            rounds: largest number of steps.
+
+        Returns:
+            The fit.
+        """
+        fit = self.fit(effects, noise, start=start, tangents=False)
         for _ in range(rounds):
-            better = self._refine_step(fit, noise)
+            better = self._refine_step(fit, noise, only)
             if better is None:
                 break
             gain = fit.statistic - better.statistic
             fit = better
             if gain < 0.05 + 1e-4 * fit.excess:
                 break
-        return fit
+        return self.fit(fit.effects, noise, start=fit.parameters)
 
-    def _refine_step(self, fit: Fit, noise: NoiseFloor) -> Fit | None:
-        if not fit.free_shapes:
+    def _refine_step(self, fit: Fit, noise: NoiseFloor, only: int) -> Fit | None:
+        shapes = tuple((k, shape) for k, shape in free_shapes(fit.effects) if k >= only)
+        if not shapes:
             return None
-        whitener = self.whitener(noise)
-        directions = stacked(
-            np.matmul(whitener, self.tangents(fit.effects, fit.columns, fit.values, fit.free_shapes))
-        )
-        flat = stacked(np.matmul(whitener, self.design(fit.effects)))
-        scale = np.linalg.norm(directions, axis=0)
-        usable = scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)
-        if not np.any(usable):
+        whitener, free = self.whitener(noise), self.free_basis(noise)
+        tangents = self.tangents(fit.effects, fit.columns, fit.values, shapes) * fit.scale[:, None]
+        directions = _off(free, whiten(whitener, tangents))
+        across = _off(fit.basis, directions)
+        strength = np.linalg.norm(across, axis=0)
+        if not np.any(strength > 1e-9):
             return None
-        _, plane, _ = solve(flat, fit.whitened)
-        across = directions - plane @ (plane.T @ directions)
-        across_scale = np.linalg.norm(across, axis=0)
-        damping = 1e-3 * np.max(across_scale)
-        normal = across.T @ across + damping**2 * np.eye(len(scale))
+        normal = across.T @ across + (1e-3 * float(strength.max())) ** 2 * np.eye(len(strength))
         step = np.linalg.solve(normal, across.T @ fit.whitened)
-        largest = max(float(np.max(np.abs(step))), 1e-300)
-        step *= min(1.0, 1.0 / largest)
+        step *= min(1.0, 1.0 / max(float(np.max(np.abs(step))), 1e-300))
         for _ in range(5):
             effects = list(fit.effects)
-            for (position, shape), amount in zip(fit.free_shapes, step, strict=True):
+            for (position, shape), amount in zip(shapes, step, strict=True):
                 effects[position] = moved(effects[position], shape, float(amount))
-            new = self.fit(effects, noise)
+            new = self.fit(effects, noise, start=fit.parameters, tangents=False)
             if new.statistic < fit.statistic:
                 return new
             step = step / 3.0
@@ -319,7 +468,7 @@ class Bench:
     # -- noise -------------------------------------------------------------------------------------------------------
 
     def period_residuals(self, fit: Fit) -> ComplexArray:
-        """(P, H + 1, E) residuals of every period from its own signals."""
+        """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""
         data = self.data
         signals = signal_effects(fit.effects)
         bodies = [e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia")]
@@ -341,8 +490,7 @@ class Bench:
             part = Contribution(link, motor)
             for signal in signals:
                 part = signal.shifted(self.robot, state.motion.time, part)
-            rows = data.rows(part) * data.weight[:: self._stride]
-            out[p] = self._period_targets[p] - spectrum(rows, data.harmonics)
+            out[p] = fit.scale * (self._period_targets[p] - spectrum(data.rows(part), data.harmonics))
         return out
 
     def _body_rows(
@@ -371,16 +519,28 @@ class Bench:
         """Noise floor with the parameters of a fit."""
         return noise_from_periods(self.period_residuals(fit))
 
-    def with_remainder(self, noise: NoiseFloor, fit: Fit, share: float) -> NoiseFloor:
-        """The noise floor raised by a share of the torque, frequency by frequency, for what no model has."""
+    def with_remainder(self, noise: NoiseFloor, share: float) -> NoiseFloor:
+        """The noise floor raised by a share of the torque, frequency by frequency, for what a model does not have."""
         if share == 0.0:
-            return noise
-        power = np.abs(self.torque_spectrum(fit)) ** 2
+            return noise.with_remainder(np.zeros_like(noise.remainder))
+        return noise.with_remainder(share**2 * self.torque_power)
+
+    @cached_property
+    def torque_power(self) -> FloatArray:
+        """(H + 1, E) power of the torque that each equation is about, per real component, smoothed over harmonics."""
+        power = np.abs(self.torque_spectrum(self.first_fit)) ** 2
         power[1:] /= 2.0
-        width = 9
-        padded = np.concatenate([power[width // 2 : 0 : -1], power, power[-2 : -2 - width // 2 : -1]])
+        half = min(4, len(power) - 1)
+        padded = np.concatenate([power[half:0:-1], power, power[-2 : -2 - half : -1]])
         total = np.cumsum(np.concatenate([np.zeros((1, power.shape[1])), padded]), axis=0)
-        return noise.with_remainder(share**2 * (total[width:] - total[:-width]) / width)
+        width = 2 * half + 1
+        return np.asarray((total[width:] - total[:-width]) / width, dtype=np.float64)
+
+    @cached_property
+    def torque_rms(self) -> FloatArray:
+        """(E,) rms of the motor torque of the joint that each equation belongs to [N m]."""
+        rms = np.sqrt(np.mean(self.data.tau_motor**2, axis=0))
+        return np.asarray(rms[[equation.index for equation in self.data.equations]], dtype=np.float64)
 
     def torque_spectrum(self, fit: Fit) -> ComplexArray:
         """(H + 1, E) torque that each equation is about: of the motor, of the spring in a link equation."""
@@ -423,6 +583,19 @@ def solve(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArr
     basis = q @ left[:, : len(strength)][:, keep]
     factor = (right[: len(strength)][keep].T / strength[keep]) / scale[:, None]
     return factor @ (basis.T @ target), basis, factor
+
+
+def whiten(whitener: ComplexArray, values: ComplexArray) -> FloatArray:
+    """(M, ...) whitened real numbers from coefficients (H + 1, E) or (H + 1, E, p)."""
+    if values.ndim == 2:
+        return stacked(np.matmul(whitener, values[:, :, None])[:, :, 0])
+    return stacked(np.matmul(whitener, values))
+
+
+def _off(basis: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns without their part in the span of an orthonormal basis."""
+    left: FloatArray = columns - basis @ (basis.T @ columns)
+    return left
 
 
 def is_signal(effect: Effect) -> bool:
@@ -487,8 +660,9 @@ def bench_derivatives(
     unit = np.zeros_like(inertial)
     unit[::10] = 1.0
     offset = 1.0 + 10.0 * float(np.max(np.abs(inertial), initial=0.0))
-    whole = robot.with_inertial_parameters(inertial + offset * unit, rotors)
-    alone = robot.with_inertial_parameters(offset * unit, np.zeros_like(rotors))
+    spare = float(np.max(np.abs(rotors), initial=1e-6))  # keeps a rotor with a negative estimate positive
+    whole = robot.with_inertial_parameters(inertial + offset * unit, rotors + 2.0 * spare)
+    alone = robot.with_inertial_parameters(offset * unit, np.full_like(rotors, 2.0 * spare))
     motion = state.motion
     x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
     v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
@@ -502,8 +676,9 @@ def bench_derivatives(
         for k in range(len(motion)):
             pin.computeRNEADerivatives(model, data, x[k], v[k], a[k])
             parts[0, k], parts[1, k] = data.dtau_dq, data.dtau_dv
-            mass = data.M
-            parts[2, k] = np.triu(mass) + np.triu(mass, 1).T
+            parts[2, k] = data.M
+        upper = np.triu(parts[2])
+        parts[2] = upper + np.triu(upper, 1).transpose(0, 2, 1)
         out.append(parts)
     result = tuple(out[0] - out[1])
     bench._derivatives = (key, result)  # type: ignore[attr-defined]

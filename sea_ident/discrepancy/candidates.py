@@ -4,19 +4,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Fit, is_signal
+from sea_ident.discrepancy.bench import Bench, Fit
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.drift import DriftEffect
+from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import EffectError
 
 NOT_IN_THE_MEAN = ("external_force", "payload", "temperature_friction", "torque_constant_drift")
 """Effects that other comparisons look for: in single periods, or against a reference."""
 
-ABSORBED = 1e-5
+SINGLE_PRECISION = 1e-4
+"""Share of the power of a column that single precision does not tell from nothing."""
+
+ABSORBED = 2e-5
 """A column of which the model leaves less than this share of its power is absorbed."""
 
 
@@ -91,7 +96,7 @@ def scan(bench: Bench, fit: Fit, noise: NoiseFloor, effects: Sequence[Effect] | 
 def examine(
     bench: Bench,
     fit: Fit,
-    whitener: np.typing.NDArray[np.complex128],
+    whitener: NDArray[np.complex128],
     left: FloatArray,
     effect: Effect,
 ) -> Candidate | None:
@@ -101,48 +106,86 @@ def examine(
         if isinstance(anchored, SignalEffect):
             shown = [bench.signal_tangent(anchored, amount, fit.effects, fit.parameters) for amount in anchored.amounts]
             variants: tuple[Effect, ...] = (anchored,)
+            touched = np.arange(len(bench.data.equations))
             spectra = np.stack(shown, axis=-1)[:, :, None, :]
         else:
-            variants = anchored.variants(bench.state(fit.effects))
-            spectra = bench.variant_spectra(variants, fit.effects)
+            variants = _coarse(anchored).variants(bench.state(fit.effects))
+            touched, spectra = bench.variant_spectra(variants, fit.effects)
     except EffectError:
         return None
     harmonics, equations, count, width = spectra.shape
     if width == 0 or not np.any(spectra):
         return None
-    flat = stacked(np.matmul(whitener, spectra.reshape(harmonics, equations, count * width)))
-    power = np.sum(flat**2, axis=0)
-    across = flat - fit.basis @ (fit.basis.T @ flat)
-    across_power = np.sum(across**2, axis=0)
-    across[:, across_power <= ABSORBED * power] = 0.0
-    shaped = across.reshape(len(flat), count, width)
-    gram = np.einsum("mvk,mvl->vkl", shaped, shaped)
+    scaled = spectra.reshape(harmonics, equations, count * width) * fit.scale[touched][:, None]
+    flat = stacked(np.matmul(whitener[:, :, touched], scaled))
+    norms = np.sqrt(np.sum(flat**2, axis=0))
+    flat /= np.where(norms > 0.0, norms, 1.0)
+    # single precision is plenty for a comparison of normalised columns, and half the work
+    shadow = (fit.basis.astype(np.float32).T @ flat.astype(np.float32)).astype(np.float64).reshape(-1, count, width)
+    shaped = flat.reshape(len(flat), count, width)
+    gram = np.einsum("mvk,mvl->vkl", shaped, shaped) - np.einsum("mvk,mvl->vkl", shadow, shadow)
     score = np.einsum("mvk,m->vk", shaped, left)
-    scale = np.sqrt(np.einsum("vkk->vk", gram))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    gram = gram / (scale[:, :, None] * scale[:, None, :])
-    inverse = np.linalg.pinv(gram, rcond=1e-8, hermitian=True)
+    scale = np.sqrt(np.maximum(np.einsum("vkk->vk", gram), 0.0))
+    visible = scale**2 > SINGLE_PRECISION
+    score = np.where(visible, score, 0.0)
+    scale = np.where(visible, scale, 1.0)
+    gram = np.where(visible[:, :, None] & visible[:, None, :], gram / (scale[:, :, None] * scale[:, None, :]), 0.0)
+    inverse = np.linalg.pinv(gram, rcond=1e-3, hermitian=True)
     values = np.einsum("vkl,vl->vk", inverse, score / scale) / scale
-    gains = np.einsum("vk,vk->v", score, values)
+    values = values / np.where(norms > 0.0, norms, 1.0).reshape(count, width)
+    gains = np.einsum("vk,vk->v", score * norms.reshape(count, width), values)
     allowed = np.array([_allowed(bench, variant, value) for variant, value in zip(variants, values, strict=True)])
-    gains = np.where(allowed, gains, 0.0)
-    best = int(np.argmax(gains))
-    chosen = variants[best]
-    if is_signal(chosen):
-        amounts = chosen.amounts  # type: ignore[attr-defined]
-        held = {
-            a.name: float(np.clip(v, a.lower, a.upper)) for a, v in zip(amounts, values[best], strict=True)
-        }
-        chosen = replace(chosen, **held)  # type: ignore[arg-type]
+    # those that single precision leaves in doubt are looked at one by one, as are the best
+    doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= 10 else set()
+    tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
+    best: Candidate | None = None
+    for v in tries:
+        found = _exactly(bench, fit, left, variants[v], shaped[:, v], norms.reshape(count, width)[v], count)
+        if best is None or found.gain > best.gain:
+            best = found
+    if best is None:
+        return None
+    return replace(best, effect=_with_smoothing_of(anchored, best.effect))
+
+
+def _exactly(
+    bench: Bench, fit: Fit, left: FloatArray, effect: Effect, columns: FloatArray, norms: FloatArray, tests: int
+) -> Candidate:
+    """A candidate with one shape, from its normalised whitened columns (M, k)."""
+    across = columns - fit.basis @ (fit.basis.T @ columns)
+    across -= fit.basis @ (fit.basis.T @ across)
+    strength = np.sum(across**2, axis=0)
+    across[:, strength <= ABSORBED] = 0.0
+    size = np.where(norms > 0.0, norms, 1.0)
+    values = np.linalg.pinv(across, rcond=1e-4) @ left / size
+    gain = float((across * size * values).sum(axis=1) @ left)
+    amounts = effect.amounts if isinstance(effect, SignalEffect) else ()
+    if amounts:
+        held = {a.name: float(np.clip(v, a.lower, a.upper)) for a, v in zip(amounts, values, strict=True)}
+        effect = replace(effect, **held)  # type: ignore[arg-type]
     return Candidate(
-        effect=chosen,
-        gain=float(gains[best]),
-        columns=width,
-        tests=count,
-        values=values[best],
-        directions=shaped[:, best],
-        raw_power=power.reshape(count, width)[best],
+        effect=effect,
+        gain=gain if _allowed(bench, effect, values) else 0.0,
+        columns=len(values),
+        tests=tests,
+        values=values,
+        directions=across * size,
+        raw_power=size**2,
     )
+
+
+def _coarse(effect: Effect) -> Effect:
+    """The effect with its smoothing rounded, so that columns are found again in the next search."""
+    smoothing = getattr(effect, "smoothing", None)
+    if smoothing is None or isinstance(effect, LoadEffect):
+        return effect
+    return replace(effect, smoothing=float(2.0 ** (round(2.0 * np.log2(smoothing)) / 2.0)))  # type: ignore[call-arg]
+
+
+def _with_smoothing_of(exact: Effect, effect: Effect) -> Effect:
+    if any(shape.name == "smoothing" for shape in effect.shapes) or not hasattr(exact, "smoothing"):
+        return effect
+    return replace(effect, smoothing=exact.smoothing)  # type: ignore[call-arg]
 
 
 def _allowed(bench: Bench, effect: Effect, values: FloatArray) -> bool:

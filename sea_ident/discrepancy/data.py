@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Contribution
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import Motion
@@ -20,6 +21,9 @@ HIGHEST_FREQUENCY = 20.0
 MOST_HARMONICS = 200
 """Largest number of harmonics that are compared."""
 
+MOST_NUMBERS = 3200
+"""Largest number of real coefficients that are compared, all equations together."""
+
 REGRESSOR_MARGIN = 1.25
 """The regressor keeps this many times the harmonics that are compared."""
 
@@ -29,6 +33,10 @@ REVERSAL_SAMPLES = 2
 
 SLOWEST = 0.02
 """Samples slower than this share of the rms speed are left out of the equation of a motor."""
+
+
+ALIKE = 0.1
+"""Combinations of samples left out that are weaker than this within the band are not freed."""
 
 
 class EquationKind(StrEnum):
@@ -69,7 +77,7 @@ class PeriodData:
         channels: further mean signals (N, n) by kind.
         equations: (E,) equations.
         harmonics: H, harmonics that are compared.
-        weight: (N, E) 0 at the samples of an equation that are left out, 1 elsewhere.
+        left_out: (N, E) samples of an equation that say nothing about a model.
         warnings: what a user should know.
     """
 
@@ -83,7 +91,7 @@ class PeriodData:
     channels: Mapping[str, FloatArray]
     equations: tuple[Equation, ...]
     harmonics: int
-    weight: FloatArray
+    left_out: NDArray[np.bool_]
     warnings: tuple[str, ...] = ()
 
     @property
@@ -131,11 +139,11 @@ def equations_of(robot: Robot) -> tuple[Equation, ...]:
     return tuple(found)
 
 
-def harmonics_for(period: float, samples: int) -> int:
+def harmonics_for(period: float, samples: int, equations: int) -> int:
     """Number of harmonics that a period of this length and this many samples is compared by."""
     by_frequency = int(HIGHEST_FREQUENCY * period)
     by_samples = int((samples - 1) / 2 / REGRESSOR_MARGIN * 0.8)
-    return max(min(by_frequency, by_samples, MOST_HARMONICS), 1)
+    return max(min(by_frequency, by_samples, MOST_HARMONICS, MOST_NUMBERS // (2 * equations)), 1)
 
 
 def wide_processing(
@@ -151,7 +159,7 @@ def wide_processing(
     first = process(recording, robot, period=period)
     if first.period is None:
         return first
-    wide = int(REGRESSOR_MARGIN * harmonics_for(first.period, first.samples))
+    wide = int(REGRESSOR_MARGIN * harmonics_for(first.period, first.samples, len(equations_of(robot))))
     return process(recording, robot, period=first.period, link_harmonics=wide, motor_harmonics=wide)
 
 
@@ -169,7 +177,10 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
     if processed.period is None:
         raise DiagnosisError(f"{processed.source} is not periodic")
     reach = min(processed.link_harmonics, processed.motor_harmonics)
-    harmonics = min(harmonics_for(processed.period, processed.samples), max(int(reach / REGRESSOR_MARGIN), 1))
+    harmonics = min(
+        harmonics_for(processed.period, processed.samples, len(equations_of(robot))),
+        max(int(reach / REGRESSOR_MARGIN), 1),
+    )
     return PeriodData(
         robot=robot,
         source=processed.source,
@@ -181,31 +192,70 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         channels=processed.channels,
         equations=equations_of(robot),
         harmonics=harmonics,
-        weight=reversal_weight(processed.motion, equations_of(robot)),
+        left_out=around_reversals(processed.motion, equations_of(robot)),
         warnings=processed.warnings,
     )
 
 
-def reversal_weight(motion: Motion, equations: tuple[Equation, ...]) -> FloatArray:
-    """(N, E) 0 where a motor is about to reverse, in the equations that hold its torque.
+def around_reversals(motion: Motion, equations: tuple[Equation, ...]) -> NDArray[np.bool_]:
+    """(N, E) whether a motor (in its own equation a link) is about to reverse.
 
     There a sample falls on one or the other side of a jump (of friction, of the efficiency of the gear) by a velocity
     that is known no better than to its sign: no model of the mean can be right.
     """
-    weight = np.ones((len(motion), len(equations)))
+    left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):
-        if equation.kind is EquationKind.LINK:
-            continue
-        speed = motion.dtheta[:, equation.index]
-        left_out = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
+        of_link = equation.kind is EquationKind.LINK
+        speed = (motion.dq if of_link else motion.dtheta)[:, equation.index]
+        left_out[:, e] = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
         crossing = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, 1)))
         for shift in range(-REVERSAL_SAMPLES, REVERSAL_SAMPLES):
-            left_out[(crossing + shift) % len(speed)] = True
-        weight[left_out, e] = 0.0
-    return weight
+            left_out[(crossing + shift) % len(speed), e] = True
+    return left_out
 
 
-def spectrum(values: FloatArray, harmonics: int) -> np.typing.NDArray[np.complex128]:
+def free_samples(left_out: NDArray[np.bool_], harmonics: int) -> NDArray[np.complex128]:
+    """Columns that take up whatever happens in the samples left out.
+
+    A sample with a free value of its own says nothing about any other parameter. Unlike a weight of zero this leaves
+    the noise of the other samples as it is, harmonic by harmonic.
+
+    Args:
+        left_out: (N, E).
+        harmonics: H.
+
+    Returns:
+        (H + 1, E, m) spectra, each in one equation; neighbouring samples that look alike within the band share one.
+    """
+    samples, equations = left_out.shape
+    columns: list[NDArray[np.complex128]] = []
+    for e in range(equations):
+        for group in _groups(left_out[:, e]):
+            phase = np.exp(-2j * np.pi * np.outer(np.arange(harmonics + 1), group) / samples) / samples
+            phase[1:] *= np.sqrt(2.0)
+            real = np.concatenate([phase.real, phase.imag])
+            left, strength, _ = np.linalg.svd(real, full_matrices=False)
+            for direction in left[:, strength > ALIKE * strength[0]].T:
+                column = np.zeros((harmonics + 1, equations), dtype=np.complex128)
+                column[:, e] = direction[: harmonics + 1] + 1j * direction[harmonics + 1 :]
+                columns.append(column)
+    if not columns:
+        return np.zeros((harmonics + 1, equations, 0), dtype=np.complex128)
+    return np.stack(columns, axis=2)
+
+
+def _groups(chosen: NDArray[np.bool_]) -> list[IntArray]:
+    """Runs of neighbouring indices, round the end of the period."""
+    indices = np.flatnonzero(chosen)
+    if not len(indices):
+        return []
+    runs = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
+    if len(runs) > 1 and indices[0] == 0 and indices[-1] == len(chosen) - 1:
+        runs[0] = np.concatenate([runs.pop(), runs[0]])
+    return runs
+
+
+def spectrum(values: FloatArray, harmonics: int) -> NDArray[np.complex128]:
     """Fourier coefficients of one period of real signals.
 
     Args:
@@ -221,7 +271,7 @@ def spectrum(values: FloatArray, harmonics: int) -> np.typing.NDArray[np.complex
     return np.asarray(coefficients, dtype=np.complex128)
 
 
-def waveform(coefficients: np.typing.NDArray[np.complex128], samples: int) -> FloatArray:
+def waveform(coefficients: NDArray[np.complex128], samples: int) -> FloatArray:
     """(N, ...) samples from the coefficients of `spectrum`: the inverse of it within the band."""
     full = np.zeros((samples // 2 + 1, *coefficients.shape[1:]), dtype=np.complex128)
     full[: len(coefficients)] = coefficients * samples

@@ -52,10 +52,12 @@ class NoiseFloor:
         """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
         count = self.equations
         total = self.covariance + np.einsum("ke,ef->kef", self.remainder, np.eye(count))
-        triangle = np.linalg.cholesky(total)
+        size = np.sqrt(np.maximum(np.real(np.einsum("kee->ke", total)), 1e-300))
+        correlation = total / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(count)
+        triangle = np.linalg.cholesky(correlation)
         unbiased = np.sqrt(max(self.freedom - count, 1.0) / self.freedom)
         inverse = np.linalg.solve(triangle, np.broadcast_to(np.eye(count, dtype=np.complex128), triangle.shape))
-        return np.asarray(unbiased * inverse, dtype=np.complex128)
+        return np.asarray(unbiased * inverse / size[:, None, :], dtype=np.complex128)
 
 
 def stacked(values: ComplexArray) -> FloatArray:

@@ -1,12 +1,12 @@
 """Which effects are missing: forward selection with a family-wise level, exchange, backward elimination."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
+from scipy.optimize import brentq
 
-from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, Fit, free_shapes
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.noise import NoiseFloor
@@ -21,25 +21,17 @@ MOST_EFFECTS = 4
 USEFUL_SHARE = 0.2
 """Share of the excess that an effect must explain to be accepted."""
 
+TOLERATED = 0.0
+"""The floor is raised until the statistic is at most this many times its degrees of freedom."""
+
+SMALLEST_SHARE = 1e-3
+"""An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
+
+BESIDE_ANOTHER = 0.05
+"""And by this share of what the largest effect beside it does: the form of that one is never known better."""
+
 FINALISTS = 5
 """Candidates that are refitted with everything free before one is accepted."""
-
-
-@dataclass(frozen=True, eq=False)
-class Accepted:
-    """An effect that was added.
-
-    Attributes:
-        effect: the effect with its refined shape.
-        values: (k,) its parameters.
-        stds: (k,) their standard deviations.
-        p_value: of the drop of the statistic, corrected for all that was tried.
-    """
-
-    effect: Effect
-    values: FloatArray
-    stds: FloatArray
-    p_value: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,38 +40,82 @@ class Selection:
 
     Attributes:
         start: the model without anything added, refitted.
-        start_noise: its noise floor.
         final: the model with the effects added.
-        final_noise: its noise floor.
-        added: number of effects added, the last ones of `final.effects`.
+        added: number of effects added, the last ones of `final.fit.effects`.
         p_values: of each added effect, corrected for all that was tried.
         candidates: scan around the final model.
         tests: number of shapes of all candidates.
     """
 
-    start: Fit
-    start_noise: NoiseFloor
-    final: Fit
-    final_noise: NoiseFloor
+    start: "Settled"
+    final: "Settled"
     added: int
     p_values: tuple[float, ...]
-    candidates: tuple[Candidate, ...] = field(default=())
+    candidates: tuple[Candidate, ...] = ()
     tests: int = 1
 
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects added."""
-        return self.final.effects[len(self.final.effects) - self.added :] if self.added else ()
+        effects = self.final.fit.effects
+        return effects[len(effects) - self.added :] if self.added else ()
 
 
-def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> tuple[Fit, NoiseFloor]:
-    """Fit a model and estimate its noise floor in turn, from nothing."""
-    fit = bench.fit(effects, None, tangents=False)
-    noise = bench.noise(fit)
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A model fitted in a noise floor that belongs to it.
+
+    Where a model is far from the data, noise alone is no measure: a link equation has nothing on its right-hand side,
+    and its tiny noise would pull all its parameters to zero. So the floor is raised by a share of the torque until
+    the misfit is no larger than twice what the floor allows. A model that is right needs no share.
+
+    Attributes:
+        fit: the fit.
+        noise: the floor that it was fitted in.
+        share: of the torque, by which the floor is raised [-].
+    """
+
+    fit: Fit
+    noise: NoiseFloor
+    share: float
+
+
+def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
+    """Fit a model and find its noise floor in turn, from nothing."""
+    fit = bench.first_fit if tuple(effects) == bench.effects else bench.fit(effects, None, tangents=False)
+    settled = Settled(fit, bench.noise(fit), 0.0)
     for _ in range(rounds):
-        fit = bench.refine(fit.effects, noise)
-        noise = bench.noise(fit)
-    return bench.fit(fit.effects, noise), noise
+        settled = settle_again(bench, settled.fit)
+    return settled
+
+
+def settle_again(bench: Bench, fit: Fit) -> Settled:
+    """Noise floor of a fit, and the fit refined in it."""
+    plain = bench.noise(fit)
+    share = needed_share(bench, fit, plain, TOLERATED) if TOLERATED else 0.0
+    noise = bench.with_remainder(plain, share)
+    anchored = bench.anchored(fit.effects, fit.parameters)
+    return Settled(bench.refine(anchored, noise, start=fit.parameters), noise, share)
+
+
+def needed_share(bench: Bench, fit: Fit, noise: NoiseFloor, ratio: float) -> float:
+    """The smallest share of the torque by which the floor must be raised so that statistic / dof is at most `ratio`.
+
+    The residual of the fit is taken as it is; fits in other floors would leave less.
+    """
+
+    def misfit(share: float) -> float:
+        floor = bench.with_remainder(noise, share)
+        return bench.statistic(fit, floor) / max(fit.dof, 1) - ratio
+
+    if misfit(0.0) <= 0.0:
+        return 0.0
+    low, high = 1e-5, 1.0
+    if misfit(low) <= 0.0:
+        return low
+    if misfit(high) > 0.0:
+        return high
+    return float(np.exp(brentq(lambda u: misfit(float(np.exp(u))), np.log(low), np.log(high), xtol=0.02)))
 
 
 def significance(gain: float, columns: int, tests: int, fit: Fit, noise: NoiseFloor) -> float:
@@ -94,66 +130,64 @@ def significance(gain: float, columns: int, tests: int, fit: Fit, noise: NoiseFl
     return min(1.0, tests * single)
 
 
-def search(bench: Bench, effects: Sequence[Effect], remainder: float = 0.0) -> Selection:
+def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
     """Find the effects that a model lacks.
 
     Args:
         bench: the recording.
         effects: the model.
-        remainder: share of the torque that no model has, as a floor of the noise [-].
 
     Returns:
         The model before and after, with what was added.
     """
-    start, plain = settle(bench, effects)
-    start_noise = bench.with_remainder(plain, start, remainder)
-    start = bench.fit(start.effects, start_noise)
-    fit, noise = start, start_noise
-    added: list[tuple[Effect, float]] = []
-    candidates: list[Candidate] = []
-    tests = 1
+    start = settle(bench, effects)
+    now = start
+    added: list[float] = []
+    largest = 0.0
     while True:
-        candidates = scan(bench, fit, noise)
+        candidates = scan(bench, now.fit, now.noise)
         tests = max(sum(c.tests for c in candidates), 1)
         if len(added) >= MOST_EFFECTS:
             break
-        step = _next(bench, fit, noise, candidates, tests)
+        step = _next(bench, now, candidates, tests, max(SMALLEST_SHARE, BESIDE_ANOTHER * largest))
         if step is None:
             break
         new, p_value = step
-        added.append((new.effects[-1], p_value))
-        fit, noise = _settle_again(bench, new, remainder)
-        fit, noise = _exchange(bench, fit, noise, len(added), remainder)
-    fit, noise, added = _eliminate(bench, fit, noise, added, tests, remainder)
-    return Selection(
-        start, start_noise, fit, noise, len(added), tuple(p for _, p in added), tuple(candidates), tests
-    )
-
-
-def _settle_again(bench: Bench, fit: Fit, remainder: float) -> tuple[Fit, NoiseFloor]:
-    noise = bench.with_remainder(bench.noise(fit), fit, remainder)
-    fit = bench.refine(bench.anchored(fit.effects, fit.parameters), noise)
-    return fit, noise
+        largest = max(largest, torque_change(bench, now.fit, new))
+        added.append(p_value)
+        now = settle_again(bench, new)
+        now = _exchange(bench, now, len(added))
+    now, added = _eliminate(bench, now, added, tests)
+    return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
 
 
 def _next(
-    bench: Bench, fit: Fit, noise: NoiseFloor, candidates: list[Candidate], tests: int
+    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: float
 ) -> tuple[Fit, float] | None:
-    """The best candidate refitted with everything free, None where none is worth it."""
+    """The best candidate refitted with everything free and its significance, None where none is worth it."""
+    fit, noise = now.fit, now.noise
     worth = [
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
     ]
     best: tuple[float, Fit, float] | None = None
     for candidate in worth[:FINALISTS]:
-        new = bench.refine((*fit.effects, candidate.effect), noise)
+        new = bench.refine((*fit.effects, candidate.effect), noise, start=fit.parameters, only=len(bench.effects))
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
-        if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not _physical(bench, new, -1):
+        if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
+            continue
+        if torque_change(bench, fit, new) < smallest:
             continue
         score = new.statistic + penalty(candidate.effect, bench)
         if best is None or score < best[0]:
             best = (score, new, p_value)
     return None if best is None else (best[1], best[2])
+
+
+def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
+    """Largest change of the residual of any equation, as a share of the rms torque that it is about [-]."""
+    change = np.sqrt(np.sum(np.abs(after.residual - before.residual) ** 2, axis=0))
+    return float(np.max(change / np.maximum(bench.torque_rms, 1e-300)))
 
 
 def penalty(effect: Effect, bench: Bench) -> float:
@@ -162,7 +196,7 @@ def penalty(effect: Effect, bench: Bench) -> float:
     return count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
 
 
-def _physical(bench: Bench, fit: Fit, position: int) -> bool:
+def physical(bench: Bench, fit: Fit, position: int) -> bool:
     """Whether an effect of a model respects the signs that physics demands, within two standard deviations."""
     position %= len(fit.effects)
     counts = bench.counts(fit.effects)
@@ -173,50 +207,47 @@ def _physical(bench: Bench, fit: Fit, position: int) -> bool:
     return True
 
 
-def _exchange(
-    bench: Bench, fit: Fit, noise: NoiseFloor, added: int, remainder: float
-) -> tuple[Fit, NoiseFloor]:
+def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
     """Replace effects that were added by better ones, now that the others are there."""
     if added < 2:
-        return fit, noise
-    for position in range(len(fit.effects) - added, len(fit.effects)):
+        return now
+    first = len(now.fit.effects) - added
+    for position in range(first, first + added):
+        fit, noise = now.fit, now.noise
         others = [e for k, e in enumerate(fit.effects) if k != position]
-        reduced = bench.fit(others, noise)
+        reduced = bench.fit(others, noise, start=fit.parameters)
         own = effect_key(fit.effects[position])
         best = fit
         for candidate in [c for c in scan(bench, reduced, noise) if c.key != own][:2]:
             if candidate.gain < 0.8 * (reduced.statistic - fit.statistic):
                 continue
-            changed = [*others[:position], candidate.effect, *others[position:]]
-            new = bench.refine(changed, noise)
+            new = bench.refine([*others[:position], candidate.effect, *others[position:]], noise, start=fit.parameters, only=len(bench.effects))
             better = best.statistic + penalty(best.effects[position], bench)
-            if new.statistic + penalty(candidate.effect, bench) < better - 1.0 and _physical(bench, new, position):
+            if new.statistic + penalty(candidate.effect, bench) < better - 1.0 and physical(bench, new, position):
                 best = new
         if best is not fit:
-            fit, noise = _settle_again(bench, best, remainder)
-    return fit, noise
+            now = settle_again(bench, best)
+    return now
 
 
-def _eliminate(
-    bench: Bench,
-    fit: Fit,
-    noise: NoiseFloor,
-    added: list[tuple[Effect, float]],
-    tests: int,
-    remainder: float,
-) -> tuple[Fit, NoiseFloor, list[tuple[Effect, float]]]:
+def _eliminate(bench: Bench, now: Settled, added: list[float], tests: int) -> tuple[Settled, list[float]]:
     """Take out effects that are no longer needed."""
+    added = list(added)
     while len(added) > 1:
+        fit, noise = now.fit, now.noise
         first = len(fit.effects) - len(added)
         scores = []
         for position in range(first, len(fit.effects)):
-            without = bench.refine([e for k, e in enumerate(fit.effects) if k != position], noise)
+            others = [e for k, e in enumerate(fit.effects) if k != position]
+            without = bench.refine(others, noise, start=fit.parameters, only=len(bench.effects))
             loss = without.statistic - fit.statistic
             columns = max(len(fit.effects[position].columns(bench.robot)), 1)
-            scores.append((significance(loss, columns, tests, without, noise), position, without))
+            needed = torque_change(bench, fit, without) >= SMALLEST_SHARE
+            p_value = significance(loss, columns, tests, without, noise) if needed else 1.0
+            scores.append((p_value, position, without))
         worst = max(scores, key=lambda s: s[0])
         if worst[0] <= FAMILY_LEVEL:
             break
-        fit, noise = _settle_again(bench, worst[2], remainder)
+        now = settle_again(bench, worst[2])
         del added[worst[1] - first]
-    return fit, noise, added
+    return now, added
