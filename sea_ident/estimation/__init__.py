@@ -11,16 +11,20 @@ from sea_ident.estimation.estimators import (
     Robust,
 )
 from sea_ident.estimation.identify import identify
+from sea_ident.estimation.knowledge import Knowledge, information_about, what_is_known
 from sea_ident.estimation.long_recording import identify_stream
 from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
 from sea_ident.estimation.model_file import model_from_dict, read_model
 from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.one_shot import identify_one_shot
 from sea_ident.estimation.physical import Box, PhysicalParameters, Pull, physical_parameters
 from sea_ident.estimation.springs import SpringResult, Verdict, identify_springs
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
+from sea_ident.estimation.update import Change, Update, updated
 
 __all__ = [
     "Box",
+    "Change",
     "CovarianceKind",
     "Estimate",
     "Estimator",
@@ -28,6 +32,7 @@ __all__ = [
     "Fit",
     "InstrumentalVariables",
     "JointWLS",
+    "Knowledge",
     "LeastSquares",
     "MaximumLikelihood",
     "Model",
@@ -39,11 +44,16 @@ __all__ = [
     "Robust",
     "SpringResult",
     "Uncertainty",
+    "Update",
     "Verdict",
     "identify",
+    "identify_one_shot",
     "identify_springs",
     "identify_stream",
+    "information_about",
     "model_from_dict",
     "physical_parameters",
     "read_model",
+    "updated",
+    "what_is_known",
 ]

@@ -19,6 +19,7 @@ from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.estimation.solve import condition_number, solve_weighted
 from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
+from sea_ident.estimation.update import updated
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording, process
@@ -49,6 +50,7 @@ def identify(
     link_harmonics: int | None = None,
     motor_harmonics: int | None = None,
     unknown_zero: Sequence[str] = (),
+    prior: Model | None = None,
 ) -> Model:
     """Identify the dynamic model of a robot, then its springs (paper, II.B and II.E).
 
@@ -63,6 +65,7 @@ def identify(
         link_harmonics: harmonics of q; chosen from the data where None.
         motor_harmonics: harmonics of theta; chosen from the data where None.
         unknown_zero: joints whose encoders of theta and q have different, unknown zeros.
+        prior: an earlier model of the robot, with the same effects; what has not changed since is taken from both.
 
     Returns:
         The model. Its standard deviations are those that the spread between periods shows.
@@ -98,7 +101,9 @@ def identify(
     found.extend([*estimate.warnings, *uncertainty.warnings])
     found.extend(_check_signs(observations))
     model = _model(observations, estimate, uncertainty, how.name)
-    springs = springs_from(observations, estimate.values, uncertainty, unknown_zero)
+    if prior is not None:
+        model = _refitted(updated(model, prior), observations)
+    springs = springs_from(observations, model.values, model.uncertainty, unknown_zero)
     found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict == "circular")
     model = replace(model, springs=springs)
     return _reported(model, found, first, (*processed.notes, *estimate.notes))
@@ -289,6 +294,17 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
         tau_spring=spring,
     )
     return replace(model, excerpt=excerpt)
+
+
+def _refitted(model: Model, observations: Observations) -> Model:
+    """The residuals of a model whose values were changed after the fit."""
+    residual = observations.residual(model.values)
+    thin = slice(None, None, max(1, -(-len(residual) // EXCERPT)))
+    return replace(
+        model,
+        fit=replace(model.fit, rms_residual=np.sqrt(np.mean(residual**2, axis=0))),
+        excerpt=replace(model.excerpt, tau_model=observations.torque[thin] - residual[thin]),
+    )
 
 
 def _no_excerpt(n: int) -> Excerpt:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from sea_ident.estimation.springs import SpringResult
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
+
+if TYPE_CHECKING:
+    from sea_ident.estimation.update import Update
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +107,7 @@ class Model:
         fit: how well it fits.
         excerpt: thinned data.
         recording: where the data came from.
+        update: how an earlier model entered, None where none did.
         notes: what was done.
         warnings: what a user should know before trusting it.
     """
@@ -120,6 +124,7 @@ class Model:
     fit: Fit
     excerpt: Excerpt
     recording: str
+    update: "Update | None" = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -217,6 +222,8 @@ class Model:
                 f"  {name}: residual {self.fit.rms_residual[i]:.4g}, noise {self.fit.noise_std[i]:.4g}, torque "
                 f"{self.fit.rms_torque[i]:.4g} (rms)"
             )
+        if self.update is not None:
+            lines.extend(f"  {line}" for line in self.update.summary().splitlines())
         lines.extend(f"  note: {text}" for text in self.notes)
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)

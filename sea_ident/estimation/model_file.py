@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from sea_ident.effects import effect_from_dict
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.springs import SpringResult, Verdict
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
+from sea_ident.estimation.update import Change, Update
 from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError
 from sea_ident.motion import Motion
 from sea_ident.regressor import model_columns
@@ -97,6 +99,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "annotation": robot.annotation,
             "joints": list(names),
         },
+        "update": None if model.update is None else _update_to_dict(model.update),
         "notes": list(model.notes),
         "warnings": list(model.warnings),
     }
@@ -217,6 +220,7 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
         ),
         excerpt=_excerpt_from_dict(record["excerpt"], robot),
         recording=str(record["recording"]),
+        update=None if record["update"] is None else _update_from_dict(record["update"]),
         notes=tuple(str(text) for text in record["notes"]),
         warnings=tuple(str(text) for text in record["warnings"]),
     )
@@ -277,6 +281,25 @@ def _spring_from_dict(entry: Mapping[str, Any]) -> SpringResult:
         verdict=Verdict(entry["verdict"]),
         covariance=tuple(tuple(float(v) for v in row) for row in entry["covariance"]),
         degrees_of_freedom=math.inf if freedom is None else float(freedom),
+    )
+
+
+def _update_to_dict(update: Update) -> dict[str, Any]:
+    return {
+        "recording": update.recording,
+        "statistic": update.statistic,
+        "p_value": update.p_value,
+        "changed": list(update.changed),
+        "changes": [asdict(change) for change in update.changes],
+    }
+
+
+def _update_from_dict(record: Mapping[str, Any]) -> Update:
+    return Update(
+        recording=str(record["recording"]),
+        changes=tuple(Change(**change) for change in record["changes"]),
+        statistic=float(record["statistic"]),
+        p_value=float(record["p_value"]),
     )
 
 

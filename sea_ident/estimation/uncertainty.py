@@ -31,6 +31,7 @@ class CovarianceKind(StrEnum):
     BLOCKS = "spread between periods, piece by piece"
     RESIDUAL = "correlated residual"
     REMAINDER = "spread between periods and correlated residual"
+    UPDATED = "new data and an earlier model"
     MODEL = "model of white torque noise"
 
 
