@@ -183,12 +183,13 @@ def _one(
 ) -> Planted:
     """One effect: all take turns where a turn is given, in an order that the seed decides."""
     order = generator(case.seed, ROWS[case.row].number, 10**6).permutation(len(entries))
-    start = int(rng.integers(len(entries))) if turn is None else turn
+    # whose turn cannot be taken here is replaced by any, so that no effect follows from its neighbour's failure
+    others = [int(k) for k in rng.permutation(len(entries))]
+    tries = others if turn is None else [int(order[turn % len(entries)]), *others]
     taken = {p.name for p in beside}
     # two effects of one kind or two trends on one joint are one effect to anybody who looks at data
     trending = {p.joint for p in beside if p.effect in TREND_EFFECTS}
-    for step in range(len(entries)):
-        entry = entries[int(order[(start + step) % len(entries)])]
+    for entry in (entries[k] for k in tries):
         if len(gauge.truth.robot.elastic_indices) == 0 and (entry.springs or entry.effect == "transmission_coupling"):
             continue
         for joint in rng.permutation(places(entry, gauge))[:3]:
