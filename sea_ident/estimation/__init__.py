@@ -13,6 +13,7 @@ from sea_ident.estimation.estimators import (
 from sea_ident.estimation.identify import identify
 from sea_ident.estimation.knowledge import Knowledge, information_about, what_is_known
 from sea_ident.estimation.long_recording import identify_stream
+from sea_ident.estimation.measured_springs import identify_measured_springs
 from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
 from sea_ident.estimation.model_file import model_from_dict, read_model
 from sea_ident.estimation.observations import Observations
@@ -47,6 +48,7 @@ __all__ = [
     "Update",
     "Verdict",
     "identify",
+    "identify_measured_springs",
     "identify_one_shot",
     "identify_springs",
     "identify_stream",

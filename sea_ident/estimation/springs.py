@@ -24,6 +24,9 @@ FOLDS = 10
 EXCITED = 0.25
 """Relative standard deviation of the stiffness beyond which a spring counts as not excited."""
 
+CIRCULAR = 1e-3
+"""What may be left of a torque channel, as a share of it, after subtracting a multiple of the deflection."""
+
 SUPPORT = 1e-3
 """Significance that a term beyond the linear spring needs."""
 
@@ -159,16 +162,26 @@ def springs_from(
             name, int(joint), processed.motion, tau[:, k], observations.mean.spring[:, k], own, uncertainty
         )
         result = _one_spring(data, name in unknown_zero)
-        factor = circular_factor(processed, int(joint))
+        channels = processed.channels
+        torques = [processed.tau_motor[:, joint]]
+        if "tau_spring" in channels:
+            torques.append(channels["tau_spring"][:, joint])
+        deflections = [processed.motion.deflection[:, joint]]
+        if "deflection" in channels:
+            deflections.append(channels["deflection"][:, joint])
+        factor = circular_factor(deflections, torques)
         if factor is not None:
-            result = replace(
-                result,
-                verdict=Verdict.CIRCULAR,
-                note=f"the torque channel is {abs(factor):.6g} x the deflection: a fit returns that factor, whatever "
-                "the spring is",
-            )
+            result = replace(result, verdict=Verdict.CIRCULAR, note=circular_note(factor))
         results.append(result)
     return tuple(results)
+
+
+def spring_from_torque(name: str, joint: int, motion: Motion, torque: FloatArray, unknown_zero: bool) -> SpringResult:
+    """A spring from its torque (N,) as it was measured [N m], with the uncertainty that the residual shows."""
+    none = np.zeros((1, 1))
+    uncertainty = Uncertainty(none, np.inf, CovarianceKind.RESIDUAL, np.zeros((0, 1)), none)
+    rows = np.zeros((len(torque), 1))
+    return _one_spring(_SpringData(name, joint, motion, torque, rows, None, uncertainty), unknown_zero)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,38 +197,33 @@ class _SpringData:
     uncertainty: Uncertainty
 
 
-def circular_factor(processed: ProcessedRecording, joint: int) -> float | None:
+def circular_factor(deflections: Sequence[FloatArray], torques: Sequence[FloatArray]) -> float | None:
     """The factor between a torque channel and the deflection, where that channel was computed from it.
 
     Args:
-        processed: the recording.
-        joint: index of the joint.
+        deflections: (N,) deflections of one joint: as measured, as fitted [rad].
+        torques: (N,) torque channels of that joint [N m].
 
     Returns:
-        The factor [N m/rad], None where no torque channel is an exact multiple of the deflection.
+        The factor [N m/rad], None where no torque channel is an exact multiple of a deflection.
     """
-    channels = [processed.tau_motor[:, joint]]
-    if "tau_spring" in processed.channels:
-        channels.append(processed.channels["tau_spring"][:, joint])
-    for deflection in _raw_and_fitted_deflection(processed, joint):
+    for deflection in deflections:
         if np.ptp(deflection) == 0.0:
             continue
-        basis = np.column_stack([deflection, np.ones_like(deflection)])
-        for torque in channels:
+        basis = np.column_stack([deflection - deflection.mean(), np.ones_like(deflection)])
+        for torque in torques:
             if np.ptp(torque) == 0.0:
                 continue
             solution, *_ = np.linalg.lstsq(basis, torque, rcond=None)
             left = torque - basis @ solution
-            if left.std() < 1e-3 * torque.std():
+            if left.std() < CIRCULAR * torque.std():
                 return float(solution[0])
     return None
 
 
-def _raw_and_fitted_deflection(processed: ProcessedRecording, joint: int) -> list[FloatArray]:
-    found = [processed.motion.deflection[:, joint]]
-    if "deflection" in processed.channels:
-        found.append(processed.channels["deflection"][:, joint])
-    return found
+def circular_note(factor: float) -> str:
+    """Why a fit would prove nothing."""
+    return f"the torque channel is {factor:.6g} x the deflection: a fit returns that factor, whatever the spring is"
 
 
 def _columns(motion: Motion, joint: int, zero: float) -> FloatArray:

@@ -128,6 +128,8 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
     others = {
         kind: recording.channel(kind, names) for kind in OTHER_CHANNELS if all(recording.has(kind, j) for j in names)
     }
+    if robot.elastic_indices.size:
+        others["deflection"] = theta - q
     return _Signals(q, theta, source, others, found, notes)
 
 

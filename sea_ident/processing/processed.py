@@ -23,7 +23,8 @@ class ProcessedRecording:
         period: length of a period [s], None where the recording is not periodic.
         period_motions: (P,) motion of every period, filtered as the mean; empty where only one is there.
         period_tau_motor: (P, N, n) motor torque of every period [N m] or [N].
-        channels: further signals (N, n) by kind, averaged alike: current, tau_spring, temperature, ...
+        channels: further signals (N, n) by kind, averaged alike: current, tau_spring, temperature, ...; `deflection` is
+            theta - q as it was measured, without the Fourier fit.
         link_harmonics: harmonics kept in q, 0 where the recording is not periodic.
         motor_harmonics: harmonics kept in theta, 0 where the recording is not periodic.
         notes: what was done.

@@ -1,0 +1,122 @@
+"""Measured data, read from beside the checkout; the numbers to meet are published ones."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sea_ident.effects import make_effect
+from sea_ident.estimation import (
+    InstrumentalVariables,
+    JointWLS,
+    LeastSquares,
+    PerSampleWLS,
+    Robust,
+    identify,
+    identify_measured_springs,
+    physical_parameters,
+)
+from sea_ident.exceptions import RecordingError, SeaIdentWarning
+from sea_ident.processing import process
+from sea_ident.recordings import read_recording
+from sea_ident.robot import load_robot
+from sea_ident.validation import validate
+
+DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
+pytestmark = [
+    pytest.mark.skipif(not DATA.is_dir(), reason="measured recordings are not beside this checkout (../shared/data)"),
+    pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning"),
+]
+
+PUBLISHED = np.array([95.1089, 203.5034, 20.3935, -3.1648])  # M [kg], Fv [N s/m], Fc [N], offset [N]
+
+
+@pytest.fixture(scope="module")
+def emps():
+    return load_robot("emps")
+
+
+@pytest.fixture(scope="module")
+def emps_model():
+    # v_off well below the speeds of the axis (0.125 m/s), as the published model has a sign function
+    return (
+        make_effect("rigid_bodies"),
+        make_effect("viscous_friction", "slider"),
+        make_effect("coulomb_friction", "slider", smoothing=1e-3),
+        make_effect("torque_offset", "slider"),
+    )
+
+
+@pytest.fixture(scope="module")
+def emps_data(emps):
+    recording = read_recording(DATA / "emps" / "identification.csv")
+    return process(recording, emps)
+
+
+def test_emps_period_is_found(emps_data):
+    assert emps_data.period == pytest.approx(6.24)
+    assert emps_data.periods == 3
+
+
+@pytest.mark.parametrize(
+    "estimator", [LeastSquares(), JointWLS(), PerSampleWLS(), Robust(), InstrumentalVariables()], ids=lambda e: e.name
+)
+def test_emps_comes_out_near_the_published_values(emps, emps_model, emps_data, estimator):
+    model = identify(emps, emps_data, effects=emps_model, estimator=estimator)
+    deviation = np.abs(model.values / PUBLISHED - 1.0)
+    # Huber's estimator sees the spikes at reversal as outliers, so friction moves a little
+    factor = 2.0 if isinstance(estimator, Robust) else 1.0
+    assert np.all(deviation < factor * np.array([0.005, 0.02, 0.02, 0.03])), deviation
+    lower, upper = model.interval()
+    assert np.all((lower < PUBLISHED) & (upper > PUBLISHED))
+
+
+def test_emps_predicts_where_no_pulse_acts(emps, emps_model, emps_data):
+    model = identify(emps, emps_data, effects=emps_model)
+    found = validate(model, read_recording(DATA / "emps" / "validation_pulses.csv"))
+    assert found.samples > 5000
+    # as well as the data it was found from
+    assert found.rms[0] < 1.25 * model.fit.rms_residual[0]
+    assert found.nrms[0] < 0.06
+
+
+def test_emps_mass_is_possible(emps, emps_model, emps_data):
+    model = identify(emps, emps_data, effects=emps_model)
+    found = physical_parameters(model)
+    assert found.consistent
+    assert found.named()["carriage.m"] == pytest.approx(model.values[0], rel=1e-9)
+
+
+def test_quanser_says_what_it_does_not_know():
+    robot = load_robot("quanser_2dof")
+    model = identify(robot, read_recording(DATA / "quanser_2dof_flexible_link" / "square_wave.csv"))
+    assert model.fit.period == pytest.approx(10.0)
+    assert model.fit.periods == 2
+    assert any("the model lacks something" in text for text in model.warnings)
+    assert [s.joint for s in model.springs] == ["stage1", "stage2"]
+    # two periods and a model that lacks something: wide intervals, not confident ones
+    assert np.all(model.uncertainty.half_width() > 2.0 * model.std)
+    # the sum of link and motor rows does not separate the inertias here, and physics shows it
+    assert not physical_parameters(model).consistent
+
+
+def test_hebi_names_the_missing_torque_constant():
+    robot = load_robot("hebi_x5")
+    recording = read_recording(DATA / "hebi_x5" / "example_log.csv")
+    with pytest.raises(RecordingError, match="no <torqueConstant>"):
+        identify(robot, recording)
+
+
+def test_hebi_torque_is_computed_from_the_deflection():
+    robot = load_robot("hebi_x5")
+    recording = read_recording(DATA / "hebi_x5" / "example_log.csv")
+    # the deflection that the firmware used is not among the columns; its torque is -40 N m/rad times it
+    columns = recording.columns
+    own = recording.replace_columns({"q_output": columns["theta_output"] + columns["tau_spring_output"] / 40.0})
+    with pytest.warns(SeaIdentWarning, match="-40 x the deflection"):
+        (spring,) = identify_measured_springs(robot, own)
+    assert spring.verdict == "circular"
+    # the encoders that are among the columns are too coarse to say anything about the spring
+    (spring,) = identify_measured_springs(robot, recording, unknown_zero=["output"])
+    assert spring.verdict != "circular"
+    assert spring.rms_residual > 0.5 * spring.rms_torque
