@@ -152,6 +152,16 @@ def test_identify_finds_the_leg_that_was_simulated(chain):
     assert (folder / "model.html").stat().st_size > 50_000
 
 
+def test_identify_adds_the_effects_asked_for(chain, tmp_path):
+    record = call_json(
+        "identify", "exo_leg", chain[0] / "rec.csv", "--period", 5, "--out", tmp_path / "model.json",
+        "--add", "torque_offset:knee", "--add", "torque_offset:hip",
+    )  # fmt: skip
+    offsets = {p["joint"]: p for p in record["parameters"] if p["effect"] == "torque_offset"}
+    assert set(offsets) == {"knee", "hip"}
+    assert all(abs(p["value"]) < 6 * p["std"] for p in offsets.values())
+
+
 def test_validate_answers_per_joint(chain):
     record = chain[1]["validate"]
     for key in ("rms", "noise_std", "nrms"):
@@ -180,6 +190,8 @@ def test_a_report_needs_the_model_file_only(chain):
         (("identify", "emps", "rec.csv", "--out", "never.json"), "slider"),
         (("identify", "exo_leg", "rec.csv", "--out", "no/never.json"), "does not exist"),
         (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--report", "never.json"), "two outputs"),
+        (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--add", "no_such_effect"), "torque_offset"),
+        (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--add", "torque_offset:elbow"), "elbow"),
         (("simulate", "exo_leg", "--excitation", "model.json", "--out", "never.csv"), "not an excitation"),
         (("excite", "exo_leg", "--out", "never.json", "--harmonics", "0"), "harmonics"),
         (("validate", "exc.json", "rec.csv"), "exc.json"),

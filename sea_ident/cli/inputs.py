@@ -1,8 +1,10 @@
 """What verbs read."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from sea_ident.effects import Effect
     from sea_ident.robot import Robot
 
 
@@ -10,5 +12,32 @@ def read_robot(source: str, annotation: str | None, joints: str | None) -> "Robo
     """The robot that the ROBOT argument and its two options mean."""
     from sea_ident.robot import load_robot
 
-    names = None if joints is None else [name.strip() for name in joints.split(",") if name.strip()]
-    return load_robot(source, annotation, names)
+    return load_robot(source, annotation, None if joints is None else split_names(joints))
+
+
+def split_names(text: str | None) -> list[str]:
+    """Names separated by commas."""
+    return [name.strip() for name in (text or "").split(",") if name.strip()]
+
+
+def read_effects(robot: "Robot", added: Sequence[str] | None) -> "tuple[Effect, ...]":
+    """Bodies, rotors and friction, and the effects that --add names.
+
+    Raises:
+        EffectError: an effect is not known, or does not fit that joint.
+    """
+    from sea_ident.effects import base_effects, effect_classes, make_effect
+    from sea_ident.exceptions import EffectError
+
+    effects = list(base_effects(robot))
+    for text in added or ():
+        name, _, joint = text.partition(":")
+        if joint:
+            robot.index(joint)
+        kind = effect_classes().get(name) or type(make_effect(name))  # which says what there is
+        found = [effect for effect in kind.instances(robot) if not joint or effect.joint == joint]
+        if not found:
+            where = f"joint {joint!r}" if joint else "any joint"
+            raise EffectError(f"the effect {name!r} does not fit {where} of {robot.name}")
+        effects.extend(found)
+    return tuple(effects)

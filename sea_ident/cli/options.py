@@ -28,6 +28,18 @@ Seed: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of eve
 Period: TypeAlias = Annotated[
     float | None, typer.Option("--period", metavar="S", help="Period of the motion [s]; not periodic without it.")
 ]
+AddedEffects: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--add",
+        metavar="EFFECT[:JOINT]",
+        help="Effect to add to bodies, rotors and friction, at one joint or all it fits; may be repeated.",
+    ),
+]
+UnknownZeros: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--unknown-zero", metavar="a,b,c", help="Joints whose encoders of link and motor differ in zero."),
+]
 ReportFile: TypeAlias = Annotated[
     Path | None, typer.Option("--report", metavar="R.html", help="Also write a report, one HTML file.")
 ]

@@ -1,16 +1,11 @@
 """Accuracy and speed beside FIGAROH on the same robots, motions and noise.
 
-    pip install figaroh && python tests/benchmarks/bench_against_figaroh.py
+    pip install figaroh && OMP_NUM_THREADS=1 python tests/benchmarks/bench_against_figaroh.py
 
 FIGAROH (1.0) is a toolbox for rigid robots. Two comparisons: (1) rigid arms, where both tools answer the same question:
 rank, identity with the inverse dynamics, time; (2) the exoskeleton leg, whose springs and rotors FIGAROH's model does
-not have: how well the model of each predicts a gait. Times are the best of three, in one thread.
+not have: how well the model of each predicts a gait. Times are the best of three.
 """
-
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
 
 import logging
 import time
@@ -96,7 +91,7 @@ def rigid_arms() -> None:
             regressor.sum[:, :, base.independent] @ base.project(robot.inertial_parameters) - torque
         ).max()
         report(name, "sea_ident", base.rank, max(error, rigid_error), seconds, base_seconds)
-        seconds, base_seconds, matrix, base_matrix, base_names, names = figaroh_base(
+        seconds, base_seconds, matrix, base_matrix, _, names = figaroh_base(
             robot, motion, friction=False, inertia=False
         )
         error = np.abs(matrix @ np.array(list(names.values())) - torque.T.ravel()).max()
@@ -124,9 +119,8 @@ def leg() -> None:
         ours.append(rms(validate(model, walked).predicted - exact))
         theirs.append(rms(figaroh_prediction(robot, processed.motion, processed.tau_motor, walked.motion) - exact))
         floor.append(rms(exact))
-    print(
-        f"\nexoskeleton leg, {SEEDS} seeds, gait torque of {np.mean(floor):.3g} N m rms: predicted less exact torque [N m rms]"
-    )
+    print(f"\nexoskeleton leg, {SEEDS} seeds, gait torque of {np.mean(floor):.3g} N m rms")
+    print("predicted less exact torque [N m rms]")
     print(f"  sea_ident                      {np.mean(ours):.4f} +- {np.std(ours):.4f}")
     print(f"  FIGAROH (rigid, motor inertia) {np.mean(theirs):.4f} +- {np.std(theirs):.4f}")
 

@@ -5,8 +5,18 @@ from typing import Annotated
 
 import typer
 
-from sea_ident.cli.inputs import read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, Period, RecordingFile, ReportFile, RobotSource
+from sea_ident.cli.inputs import read_effects, read_robot, split_names
+from sea_ident.cli.options import (
+    AddedEffects,
+    AnnotationFile,
+    AsJson,
+    JointNames,
+    Period,
+    RecordingFile,
+    ReportFile,
+    RobotSource,
+    UnknownZeros,
+)
 from sea_ident.cli.output import check_targets, emit, progress
 
 
@@ -16,6 +26,8 @@ def identify(
     out: Annotated[Path, typer.Option("--out", metavar="MODEL.json", help="Model to write.", show_default=False)],
     period: Period = None,
     report: ReportFile = None,
+    add: AddedEffects = None,
+    unknown_zero: UnknownZeros = None,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
     as_json: AsJson = False,
@@ -26,9 +38,16 @@ def identify(
 
     check_targets(out, report)
     loaded = read_robot(robot, annotation, joints)
+    effects = read_effects(loaded, add)
     measured = read_recording(recording)
     with progress("identifying"):
-        model = run(loaded, measured, period=period)
+        model = run(
+            loaded,
+            measured,
+            effects=effects,
+            period=period,
+            unknown_zero=split_names(unknown_zero),
+        )
     model.save(out)
     files = [str(out)]
     if report is not None:
