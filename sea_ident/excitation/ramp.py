@@ -185,9 +185,9 @@ def _spline_to(
     smooth = derivatives[3] @ free
     target = derivatives[3] @ fixed
     scale = duration**6 / len(smooth)
-    hessian: FloatArray = np.kron(
-        np.eye(n), scale * smooth.T @ smooth + 1e-3 * np.diag(np.eye(width)[0]) + 1e-9 * np.eye(width)
-    )
+    block = scale * smooth.T @ smooth + 1e-9 * np.eye(width)
+    block[0, 0] += 1e-3
+    hessian = np.asarray(np.kron(np.eye(n), block), dtype=np.float64)
     pull = scale * smooth.T @ target
     pull[0] -= 1e-3 * centre
     bounds_low, bounds_high = (np.concatenate(values) if values else np.zeros(0) for values in (lower, upper))

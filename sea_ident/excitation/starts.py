@@ -176,7 +176,13 @@ def _singular(problem: Problem, information: Information, point: FloatArray) -> 
 
 
 def _loosen(problem: Problem, point: FloatArray) -> FloatArray:
-    """Shrink a start until torque and other nonlinear limits hold too, with room to move."""
+    """Shrink a start until torque and other nonlinear limits hold too, with room to move.
+
+    It is rounded: the last digits of a QP's solution may depend on where its memory happens to lie, and an ascent would
+    carry them on into another optimum.
+    """
+    grain = 2.0 ** np.round(np.log2(np.abs(point).max()) - 20.0)
+    point = np.round(point / grain) * grain
     factor = 0.95
     for _ in range(40):
         trial = problem.centre + factor * (point - problem.centre)
