@@ -86,7 +86,7 @@ def experiment(annotation):
     simulations = []
     for seed, periods, starts in ((0, PERIODS, 1 if REDUCED else 3), (1, 3, 1)):
         excitation = design_excitation(
-            robot, base_frequency=FREQUENCY, harmonics=3 if REDUCED else 5, starts=starts, seed=seed, rate=RATE
+            robot, base_frequency=FREQUENCY, harmonics=4 if REDUCED else 5, starts=starts, seed=seed, rate=RATE
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeaIdentWarning)
