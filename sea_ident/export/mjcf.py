@@ -13,7 +13,8 @@ its mass and transverse inertia belong to the link that carries it. So every rot
 inertia about each transverse axis (a thin disc) out of that link, which leaves the same robot.
 
 MuJoCo's frictionloss is the sign function where this project has tanh(v / v_off); they agree to rounding from 20 v_off
-on. The efficiency of the gear and the torque constant are not in an MJCF: its input is a torque after the gear.
+on. A cubic spring needs a MuJoCo with polynomial stiffness (4.0 has it), linear ones do not. The efficiency of the gear
+and the torque constant are not in an MJCF: its input is a torque after the gear.
 """
 
 from dataclasses import dataclass

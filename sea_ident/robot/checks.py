@@ -82,7 +82,9 @@ def check_annotation(tree: UrdfTree, annotation: Annotation, joints: Sequence[Jo
         joint.name for joint in joints if joint.type != "continuous" and np.isinf(tree.joints[joint.name].lower)
     ]
     if unlimited:
-        notes.append(f"no range is stated for {', '.join(unlimited)} (lower = upper = 0): taken as unlimited")
+        notes.append(
+            f"no range is stated for {', '.join(unlimited)} (no <limit>, or lower = upper = 0): taken as unlimited"
+        )
     if annotation.ignored:
         kinds = ", ".join(annotation.ignored)
         notes.append(f"transmissions of these types are not read, their joints count as rigid: {kinds}")
