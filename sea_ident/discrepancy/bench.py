@@ -121,9 +121,7 @@ class Bench:
         self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
         stride = max(1, int(data.samples / (PERIOD_SAMPLES * data.harmonics)))
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
-        self._period_targets = [
-            spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor
-        ]
+        self._period_targets = [spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor]
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
 
@@ -139,6 +137,16 @@ class Bench:
             self._states[signals] = State(self.robot, motion, self.data.channels)
         return self._states[signals]
 
+    def predicted(self, effects: Sequence[Effect], parameters: Mapping[str, float]) -> Fit:
+        """A model with given parameters, nothing fitted."""
+        effects, columns = tuple(effects), self.labels(effects)
+        values = np.array([parameters.get(column.name, 0.0) for column in columns])
+        residual = self._target - self.design(effects) @ values
+        none = np.zeros((len(values), 0))
+        unit = np.ones(len(self.data.equations))
+        flat = stacked(residual)
+        return Fit(effects, columns, values, residual, unit, flat, np.zeros((len(flat), 0)), none, ())
+
     def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect within a model."""
         signals = signal_effects(effects)
@@ -149,9 +157,7 @@ class Bench:
             self._columns[key] = self._spectra(effect.evaluate(self.state(effects)), signals)
         return self._columns[key]
 
-    def variant_spectra(
-        self, variants: Sequence[Effect], effects: Sequence[Effect]
-    ) -> tuple[IntArray, ComplexArray]:
+    def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
         """Columns of one effect in all its variants.
 
         Returns:
@@ -175,6 +181,10 @@ class Bench:
         rows = self.data.rows(part)
         touched = np.array([e for e in range(rows.shape[1]) if np.any(rows[:, e])], dtype=np.intp)
         return touched, spectrum(rows[:, touched], self.data.harmonics)
+
+    def spectra_of(self, part: Contribution, effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, ...) of link and motor rows (N, n, ...) within a model."""
+        return self._spectra(part, signal_effects(effects))
 
     def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
         touched, found = self._touched(part, signals)
@@ -203,6 +213,7 @@ class Bench:
         *,
         start: Mapping[str, float] | None = None,
         tangents: bool = True,
+        known: ComplexArray | None = None,
     ) -> Fit:
         """Fit the parameters of a model, its shapes held.
 
@@ -215,22 +226,24 @@ class Bench:
             noise: noise floor; without one all equations count alike, and no scale can go wrong.
             start: parameters by name to start from; those of the unweighted fit by default.
             tangents: whether shapes are free in what is said about degrees of freedom and covariance.
+            known: (H + 1, E) torque that is there beside the model.
 
         Returns:
             The fit.
         """
         effects = tuple(effects)
         columns, design, whitener = self.labels(effects), self.design(effects), self.whitener(noise)
+        target = self._target if known is None else self._target - known
         free = self.free_basis(noise)
         values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
             start = self.fit(effects, None, tangents=False).parameters
         if start is not None:
-            values = np.array([start.get(c.name, v if c.name in start else 0.0) for c, v in zip(columns, values, strict=True)])
+            values = np.array([start.get(column.name, 0.0) for column in columns])
         cost, best = np.inf, None
         step = np.zeros(0)
         for _ in range(MOST_FIT_STEPS if noise is not None else 1):
-            residual = self._target - design @ values
+            residual = target - design @ values
             scale = np.ones(len(self.data.equations)) if noise is None else self.link_scale(columns, values)
             whitened = _off(free, whiten(whitener, residual * scale))
             new_cost = float(whitened @ whitened)
@@ -246,7 +259,7 @@ class Bench:
             step = solve(_off(free, whiten(whitener, flat)), whitened)[0]
             values = values + step
         if noise is None:
-            residual, scale = self._target - design @ values, np.ones(len(self.data.equations))
+            residual, scale = target - design @ values, np.ones(len(self.data.equations))
             whitened = _off(free, whiten(whitener, residual))
         else:
             assert best is not None
@@ -307,6 +320,17 @@ class Bench:
         """Weighted sum of squares of the residual of a fit in another noise floor, without fitting again."""
         left = _off(self.free_basis(noise), whiten(noise.whitener(), fit.residual * fit.scale))
         return float(left @ left)
+
+    def clean_residual(self, fit: Fit, noise: NoiseFloor) -> ComplexArray:
+        """(H + 1, E) residual of a fit without what the samples that are left out put into it [N m]."""
+        if not self._free.shape[2]:
+            return fit.residual
+        whitener = noise.whitener()
+        free = whiten(whitener, self._free)
+        norms = np.linalg.norm(free, axis=0)
+        amounts = np.linalg.lstsq(free / norms, whiten(whitener, fit.residual * fit.scale), rcond=1e-8)[0] / norms
+        cleaned: ComplexArray = fit.residual - (self._free @ amounts) / fit.scale
+        return cleaned
 
     def whitener(self, noise: NoiseFloor | None) -> ComplexArray:
         """(H + 1, E, E) whitening of a noise floor."""
@@ -493,9 +517,7 @@ class Bench:
             out[p] = fit.scale * (self._period_targets[p] - spectrum(data.rows(part), data.harmonics))
         return out
 
-    def _body_rows(
-        self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]
-    ) -> list[tuple[State, FloatArray]]:
+    def _body_rows(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> list[tuple[State, FloatArray]]:
         """State and rows (N', 2 n, k) of bodies and rotors for every period, at fewer samples."""
         if signals not in self._period_bodies:
             if len(self._period_bodies) > 3:
@@ -625,9 +647,7 @@ def moved(effect: Effect, shape: Shape, step: float) -> Effect:
     return replace(effect, **{shape.name: float(np.clip(new, shape.lower, shape.upper))})  # type: ignore[arg-type]
 
 
-def _bodies_tangent(
-    bench: Bench, state: State, low: Motion, high: Motion, parameters: dict[str, float]
-) -> FloatArray:
+def _bodies_tangent(bench: Bench, state: State, low: Motion, high: Motion, parameters: dict[str, float]) -> FloatArray:
     """(2, N, n) change of link and motor rows of bodies and rotors from one motion to another close by."""
     robot, motion = bench.robot, state.motion
     dx = robot.extended_state(high.q, high.theta) - robot.extended_state(low.q, low.theta)

@@ -10,13 +10,13 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, Fit
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.effects import Effect, effect_classes
-from sea_ident.effects.drift import DriftEffect
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import EffectError
 
-NOT_IN_THE_MEAN = ("external_force", "payload", "temperature_friction", "torque_constant_drift")
-"""Effects that other comparisons look for: in single periods, or against a reference."""
+ONLY_AGAINST_REFERENCE = ("payload",)
+"""Effects that a fit of all parameters absorbs altogether."""
 
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
@@ -70,7 +70,7 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
     present_columns = {column.name for column in bench.labels(effects)}
     found = []
     for name, kind in sorted(effect_classes().items()):
-        if name in NOT_IN_THE_MEAN or issubclass(kind, DriftEffect):
+        if name in ONLY_AGAINST_REFERENCE or issubclass(kind, TrendEffect):
             continue
         for effect in kind.instances(bench.robot):
             if effect_key(effect) in present:

@@ -221,7 +221,12 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
         for candidate in [c for c in scan(bench, reduced, noise) if c.key != own][:2]:
             if candidate.gain < 0.8 * (reduced.statistic - fit.statistic):
                 continue
-            new = bench.refine([*others[:position], candidate.effect, *others[position:]], noise, start=fit.parameters, only=len(bench.effects))
+            new = bench.refine(
+                [*others[:position], candidate.effect, *others[position:]],
+                noise,
+                start=fit.parameters,
+                only=len(bench.effects),
+            )
             better = best.statistic + penalty(best.effects[position], bench)
             if new.statistic + penalty(candidate.effect, bench) < better - 1.0 and physical(bench, new, position):
                 best = new

@@ -1,0 +1,177 @@
+"""What else an effect could be, whether it holds on another motion, and what could not have been seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit
+from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.diagnosis import Alternative, Detectability
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, Settled, penalty, physical, significance
+from sea_ident.effects import Effect
+from sea_ident.effects.signal import SignalEffect
+
+EQUALLY_GOOD = 13.8
+"""Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
+
+LOOKS_ALIKE = 0.9
+"""Share of one effect in the span of another from which on they are called confusable."""
+
+RIVALS = 8
+"""Candidates that are tried in the place of an effect."""
+
+POWER_QUANTILE = 1.645
+"""Standard deviations that make 19 detections out of 20."""
+
+
+def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, ...]]:
+    """Effects that do as well in the place of each effect that was added, by its position in the model."""
+    now = selection.final
+    fit, noise = now.fit, now.noise
+    first = len(fit.effects) - selection.added
+    found = {}
+    for position in range(first, len(fit.effects)):
+        own = fit.effects[position]
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        reduced = bench.fit(others, noise, start=fit.parameters)
+        gain = reduced.statistic - fit.statistic
+        unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        alike: list[Alternative] = []
+        tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)][:RIVALS]
+        for candidate in tried:
+            if candidate.gain < 0.3 * gain:
+                break
+            model = [*others[:position], candidate.effect, *others[position:]]
+            new = bench.refine(model, noise, start=fit.parameters, only=len(bench.effects))
+            price = penalty(candidate.effect, bench) - penalty(own, bench)
+            if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit and physical(bench, new, position):
+                explained = reduced.whitened - fit.whitened
+                share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
+                alike.append(Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0)))
+        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
+        found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
+    return found
+
+
+def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
+    """(H + 1, E) torque of some effects of a fit on the motion of a bench, which may be another one."""
+    total = np.zeros((bench.data.harmonics + 1, len(bench.data.equations)), dtype=np.complex128)
+    for position in positions:
+        effect = fit.effects[position]
+        own = np.array([fit.parameters[c.name] for c in effect.columns(bench.robot)])
+        if len(own):
+            total += bench.column_spectra(effect, fit.effects) @ own
+    return total
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """How an effect does on data that were not used.
+
+    Attributes:
+        share: of what it could explain there, what it does explain with its parameters as they are [-].
+        tested: whether there was enough to explain to tell.
+    """
+
+    share: float
+    tested: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing speaks against it."""
+        return not self.tested or self.share > 0.5
+
+
+def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]:
+    """Try every effect that was added on other data: its parameters as they are, the rest of the model fitted anew.
+
+    Args:
+        bench: the other data.
+        selection: what was found.
+        now: the found model, fitted anew to the other data, with the noise floor there.
+
+    Returns:
+        One result for each effect that was added.
+    """
+    fit, noise = selection.final.fit, now.noise
+    first = len(fit.effects) - selection.added
+    base = list(fit.effects[:first])
+    added = list(range(first, len(fit.effects)))
+    out = []
+    for position in added:
+        others = [p for p in added if p != position]
+        signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
+        own_signal = [fit.effects[position]] if isinstance(fit.effects[position], SignalEffect) else []
+        start = fit.parameters
+        known = contribution(bench, fit, others)
+        without = bench.fit([*base, *signals], noise, start=start, tangents=False, known=known)
+        whole = contribution(bench, fit, added)
+        fixed = bench.fit([*base, *signals, *own_signal], noise, start=start, tangents=False, known=whole)
+        free = (
+            bench.refine([*base, *signals, fit.effects[position]], noise, start=start, only=len(base) + len(signals))
+            if not others
+            else now.fit
+        )
+        possible = without.statistic - min(free.statistic, fixed.statistic)
+        columns = max(len(fit.effects[position].columns(bench.robot)), 1)
+        tested = significance(possible, columns, 10, without, noise) < FAMILY_LEVEL
+        share = (without.statistic - fixed.statistic) / possible if possible > 0.0 else 0.0
+        out.append(Transfer(float(share), bool(tested)))
+    return out
+
+
+def detectability(
+    bench: Bench, fit: Fit, noise: NoiseFloor, candidates: Sequence[Candidate]
+) -> tuple[Detectability, ...]:
+    """Smallest size of every candidate that would have been found, and what it is easily taken for."""
+    tests = max(sum(c.tests for c in candidates), 1)
+    bases = [_orthonormal(c.directions) for c in candidates]
+    labels = [_label(c) for c in candidates]
+    stack = np.concatenate([b for b in bases], axis=1) if bases else np.zeros((len(fit.whitened), 0))
+    gram = stack.T @ stack
+    starts = np.concatenate([[0], np.cumsum([b.shape[1] for b in bases])]).astype(int)
+    out = []
+    for i, candidate in enumerate(candidates):
+        threshold = float(stats.f.isf(FAMILY_LEVEL / tests, candidate.columns, max(noise.total_freedom, 4.0)))
+        needed = np.sqrt(threshold * candidate.columns) + POWER_QUANTILE
+        strength = np.linalg.norm(candidate.directions, axis=0)
+        best = int(np.argmax(strength)) if len(strength) else 0
+        smallest = needed / strength[best] if len(strength) and strength[best] > 0.0 else float("inf")
+        mine = slice(starts[i], starts[i + 1])
+        alike = []
+        for k in range(len(candidates)):
+            block = gram[mine, starts[k] : starts[k + 1]]
+            if k != i and block.size and float(np.linalg.norm(block, 2)) ** 2 > LOOKS_ALIKE:
+                alike.append(labels[k])
+        out.append(
+            Detectability(
+                effect=candidate.effect.name,
+                joint=candidate.effect.joint,
+                smallest=float(smallest),
+                unit=_unit(bench, candidate.effect, best),
+                absorbed=float(np.clip(candidate.absorbed, 0.0, 1.0)),
+                confusable_with=tuple(alike),
+            )
+        )
+    return tuple(sorted(out, key=lambda d: (d.effect, str(d.joint))))
+
+
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    kept: FloatArray = left[:, strength > 1e-6 * max(float(strength.max(initial=0.0)), 1e-300)]
+    return kept if np.any(strength > 0.0) else kept[:, :0]
+
+
+def _label(candidate: Candidate) -> str:
+    effect = candidate.effect
+    return effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
+
+
+def _unit(bench: Bench, effect: Effect, column: int) -> str:
+    if isinstance(effect, SignalEffect):
+        return effect.shape_unit(effect.amounts[column], bench.robot)
+    return effect.columns(bench.robot)[column].unit

@@ -1,0 +1,228 @@
+"""Checks at the border: recordings that prove nothing, clipped channels, spikes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.estimation import Model
+from sea_ident.exceptions import DiagnosisError, RecordingError
+from sea_ident.processing import ProcessedRecording
+from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
+
+CLIPPED_RUN = 4
+"""Equal extreme samples in a row, in every period, that count as clipped."""
+
+CLIPPED_SHARE = 0.05
+"""Share of clipped samples beyond which nothing can be told."""
+
+SPIKE = 12.0
+"""Distance from the other periods, in their own spread, that counts as a spike."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What was found at the border.
+
+    Attributes:
+        warnings: what a user should know.
+        fatal: whether no conclusion can be drawn.
+    """
+
+    warnings: tuple[str, ...] = ()
+    fatal: bool = False
+
+
+def models_match(model: Model, reference: Model | None) -> None:
+    """Refuse a reference of another robot.
+
+    Raises:
+        DiagnosisError: its joints differ.
+    """
+    if reference is not None and reference.robot.joint_names != model.robot.joint_names:
+        raise DiagnosisError(
+            f"the reference is a model of {reference.robot.name} ({', '.join(reference.robot.joint_names)}), the model "
+            f"is one of {model.robot.name} ({', '.join(model.robot.joint_names)}); give an earlier model of the same "
+            "robot"
+        )
+
+
+def columns_match(robot: Robot, recording: Recording | ProcessedRecording) -> None:
+    """Refuse a recording of another robot.
+
+    Raises:
+        DiagnosisError: it does not have the joints of the robot.
+    """
+    if isinstance(recording, ProcessedRecording):
+        have: tuple[str, ...] = recording.joint_names
+        matches = have == robot.joint_names
+    else:
+        have = recording.joints
+        matches = all(name in have for name in robot.joint_names)
+    if not matches:
+        raise DiagnosisError(
+            f"{recording.source} holds the joints {', '.join(have) or 'none'}; the model is one of {robot.name} with "
+            f"{', '.join(robot.joint_names)}. Is it a recording of another robot?"
+        )
+
+
+def not_the_same(recording: Recording | ProcessedRecording, holdout: Recording | ProcessedRecording) -> None:
+    """Refuse the same data given twice.
+
+    Raises:
+        DiagnosisError: they are the same, or one holds the other.
+    """
+    first, second = _fingerprint(recording), _fingerprint(holdout)
+    if first is None or second is None:
+        return
+    short, long = sorted((first, second), key=len)
+    rows = {row.tobytes() for row in long}
+    common = sum(row.tobytes() in rows for row in short)
+    if common > 0.5 * len(short):
+        raise DiagnosisError(
+            f"the held-out recording {holdout.source} is the recording {recording.source} itself ({common} of "
+            f"{len(short)} samples are the same): it proves nothing. Record another motion, or leave it out"
+        )
+
+
+def _fingerprint(recording: Recording | ProcessedRecording) -> FloatArray | None:
+    if isinstance(recording, ProcessedRecording):
+        values = np.concatenate([np.asarray(recording.period_tau_motor).reshape(-1, len(recording.joint_names))])
+    else:
+        names = [n for n in recording.columns if n.startswith(("tau_motor_", "current_", "q_", "theta_"))]
+        names = [n for n in names if "_reference_" not in n]
+        values = np.stack([recording.columns[n] for n in sorted(names)], axis=1)
+    return np.ascontiguousarray(values) if len(values) else None
+
+
+def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) -> FloatArray | None:
+    """(P, n) mean temperature of every period [degC], None where it was not measured at every joint."""
+    if isinstance(recording, ProcessedRecording):
+        return None
+    names = data.robot.joint_names
+    try:
+        values = recording.channel("temperature", names)
+    except RecordingError:
+        return None
+    # the last whole periods, as the processing takes them
+    samples = round(data.period * recording.sample_rate)
+    count = data.periods * samples
+    if len(values) < count:
+        return None
+    return np.asarray(values[len(values) - count :].reshape(data.periods, samples, -1).mean(axis=1), dtype=np.float64)
+
+
+def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tuple[PeriodData, Findings]:
+    """The data without periods that hold spikes and without clipped torques, with what was found.
+
+    Args:
+        data: the periods.
+        recording: what they come from.
+
+    Returns:
+        Data, and findings.
+    """
+    warnings = list(data.warnings)
+    fatal = False
+    spiked = _spiked_periods(data)
+    if spiked:
+        keep = [p for p in range(data.periods) if p not in spiked]
+        where = ", ".join(str(p + 1) for p in sorted(spiked)[:8])
+        if len(keep) >= max(2, data.periods // 2):
+            warnings.append(
+                f"{data.source}: spikes in period(s) {where} of {data.periods}, far outside what the other periods "
+                "show; these periods were left out. Check the wiring of the sensor"
+            )
+            data = _subset(data, keep)
+        else:
+            warnings.append(
+                f"{data.source}: spikes in {len(spiked)} of {data.periods} periods ({where}): too many to leave out. "
+                "Repair the sensor and record again"
+            )
+            fatal = True
+    clipped = _clipped(data)
+    share = clipped.mean(axis=0)
+    for i in np.flatnonzero(share > 0.0):
+        name = data.robot.joint_names[int(i)]
+        warnings.append(
+            f"{data.source}: the torque or current of {name!r} stays at its largest value for {100 * share[i]:.2g} % of "
+            "the time: it is clipped. These samples were left out; record with less torque"
+        )
+        fatal = fatal or bool(share[i] > CLIPPED_SHARE)
+    if np.any(clipped):
+        left_out = data.left_out.copy()
+        for e, equation in enumerate(data.equations):
+            if equation.kind is not EquationKind.LINK:
+                left_out[:, e] |= clipped[:, equation.index]
+        data = replace(data, left_out=left_out)
+    if not isinstance(recording, ProcessedRecording):
+        stuck = _clipped_positions(data, recording)
+        warnings.extend(stuck)
+        fatal = fatal or bool(stuck)
+    return data, Findings(tuple(warnings), fatal)
+
+
+def _spiked_periods(data: PeriodData) -> set[int]:
+    if data.periods < 4:
+        return set()
+    out: set[int] = set()
+    stacks = [
+        data.period_tau_motor,
+        *(np.stack([getattr(m, k) for m in data.period_motions]) for k in ("ddq", "ddtheta")),
+    ]
+    for stack in stacks:
+        middle = np.median(stack, axis=0)
+        distance = np.abs(stack - middle)
+        usual = 1.4826 * np.median(distance, axis=0)
+        # near a reversal the spread is what it is there; nowhere is it smaller than in general
+        scale = np.maximum(usual, np.median(usual, axis=0))
+        span = np.ptp(middle, axis=0)
+        far = (distance > SPIKE * scale) & (distance > 0.2 * span) & (scale > 0.0)
+        out |= {int(p) for p in np.flatnonzero(far.any(axis=(1, 2)))}
+    return out
+
+
+def _subset(data: PeriodData, keep: list[int]) -> PeriodData:
+    motions = tuple(data.period_motions[p] for p in keep)
+    tau = data.period_tau_motor[keep]
+    names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
+    mean = {name: np.mean([getattr(m, name) for m in motions], axis=0) for name in names}
+    motion = type(data.motion)(data.motion.time, **mean)
+    return replace(data, motion=motion, tau_motor=tau.mean(axis=0), period_motions=motions, period_tau_motor=tau)
+
+
+def _clipped(data: PeriodData) -> NDArray[np.bool_]:
+    """(N, n) samples at which the torque stays at the largest value of its joint, in most periods."""
+    out = np.zeros(data.tau_motor.shape, dtype=np.bool_)
+    for i in range(data.robot.n):
+        tau = data.period_tau_motor[:, :, i]
+        for extreme in (tau.max(), tau.min()):
+            at = np.isclose(tau, extreme, rtol=1e-9, atol=0.0)
+            often = at.mean(axis=0) > 0.5
+            for run in np.split(np.arange(len(often)), np.flatnonzero(np.diff(often.astype(int))) + 1):
+                if often[run[0]] and len(run) >= CLIPPED_RUN:
+                    out[run, i] = True
+    return out
+
+
+def _clipped_positions(data: PeriodData, recording: Recording) -> list[str]:
+    found = []
+    for name in data.robot.joint_names:
+        values = recording.columns[f"q_{name}"]
+        step = np.abs(np.diff(values))
+        resolution = float(np.min(step[step > 0.0])) if np.any(step > 0.0) else 0.0
+        for extreme in (values.max(), values.min()):
+            at = values == extreme
+            runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
+            # a coarse encoder holds its last count round a reversal; a clipped one holds it while the speed is high
+            entry = np.flatnonzero(np.diff(at.astype(int)) == 1)
+            speed = float(np.median(step[np.maximum(entry - 1, 0)])) if len(entry) else 0.0
+            if len(runs) and np.median(runs) > 20 and speed > 5.0 * max(resolution, 1e-300) and speed > 0.0:
+                found.append(
+                    f"{data.source}: q_{name} runs into {extreme:.4g} and stays there: the position is clipped. "
+                    "Nothing can be concluded from it"
+                )
+    return found

@@ -1,0 +1,371 @@
+"""`diagnose`: where a model and a recording disagree, and which effect is missing."""
+
+import warnings as python_warnings
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy import stats
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy import assess, check, words
+from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.data import PeriodData, period_data, waveform, wide_processing
+from sea_ident.discrepancy.diagnosis import (
+    Alternative,
+    Diagnosis,
+    LackOfFit,
+    MissingEffect,
+    MissingParameter,
+    Verdict,
+    Waveforms,
+)
+from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.locate import locate
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
+from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.search import Selection, Settled, needed_share, search, settle_again
+from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
+from sea_ident.effects import Effect, spring_effects
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.estimation import Model
+from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
+from sea_ident.processing import ProcessedRecording
+from sea_ident.recordings import Recording
+
+FEWEST_PERIODS = 10
+"""Periods from which on an effect is named without reservation."""
+
+LACK_LEVEL = 1e-3
+"""Probability below which a remainder counts as something that is missing."""
+
+LARGEST_REMAINDER = 3e-3
+"""Share of the torque that may be left as what no model has [-]."""
+
+UNEXPLAINED = 0.5
+"""Share of the excess from which on the effects found are no explanation of it [-]."""
+
+Progress = Callable[[str, float], None]
+
+
+def diagnose(
+    model: Model,
+    recording: Recording | ProcessedRecording,
+    *,
+    holdout: Recording | ProcessedRecording | None = None,
+    reference: Model | None = None,
+    period: float | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find where a model and a recording disagree beyond noise, name the missing effect, and test the name.
+
+    Args:
+        model: the model; its effects are refitted to the recording, so a model from CAD serves as well.
+        recording: what was measured; ten periods or more for a name without reservation.
+        holdout: another motion of the same robot, on which what is found must hold.
+        reference: an earlier model of the same robot; shows what a refit absorbs (a payload, a changed inertia).
+        period: [s]; found from the data by default.
+        progress: called with what is being done and the share that is done.
+
+    Returns:
+        The diagnosis.
+
+    Raises:
+        DiagnosisError: the recordings prove nothing (the same twice, another robot).
+        RecordingError: a recording lacks what is needed.
+    """
+    tell = progress or (lambda what, share: None)
+    tell("reading the periods", 0.0)
+    robot = model.robot
+    check.models_match(model, reference)
+    check.columns_match(robot, recording)
+    if holdout is not None:
+        check.columns_match(robot, holdout)
+        check.not_the_same(recording, holdout)
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        processed = wide_processing(recording, robot, period or _period_of(model, recording))
+    if processed.period is None or processed.periods < 2:
+        from sea_ident.discrepancy.unrepeated import diagnose_unrepeated
+
+        return diagnose_unrepeated(model, processed, recording)
+    data, notes = check.cleaned(period_data(processed, robot), recording)
+    bench = Bench(data, model_effects(model))
+    tell("searching", 0.1)
+    selection = search(bench, bench.effects)
+    tell("comparing the periods", 0.5)
+    trends = compare_periods(bench, selection.final.fit, selection.final.noise, check.temperatures(recording, data))
+    tell("looking for alternatives", 0.6)
+    alternatives = assess.rivals(bench, selection)
+    tell("testing on held-out data", 0.75)
+    held = _held_out(bench, selection, holdout, model)
+    change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
+    tell("writing it down", 0.9)
+    diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes, processed)
+    tell("done", 1.0)
+    for text in diagnosis.warnings:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+    return diagnosis
+
+
+def model_effects(model: Model) -> tuple[Effect, ...]:
+    """Effects of a model with its springs among them."""
+    return (*model.effects, *spring_effects(model.robot)) if model.robot.elastic_indices.size else model.effects
+
+
+def _period_of(model: Model, recording: Recording | ProcessedRecording) -> float | None:
+    """The period of the recording that the model was identified from, if this is the same one."""
+    if isinstance(recording, Recording) and recording.source == model.recording:
+        return model.fit.period
+    return None
+
+
+class HeldOut:
+    """Data that were not used, and what the found effects are worth there.
+
+    Attributes:
+        bench: the data.
+        before: the model without the effects on them.
+        after: the model with the effects on them.
+        noise: noise floor there.
+        transfers: one per effect that was added.
+        source: what the data are.
+        other_motion: whether it is another motion, not only other periods.
+    """
+
+    def __init__(
+        self, bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, transfers: list[assess.Transfer],
+        source: str, other_motion: bool,
+    ) -> None:  # fmt: skip
+        self.bench, self.before, self.after, self.noise = bench, before, after, noise
+        self.transfers, self.source, self.other_motion = transfers, source, other_motion
+
+
+def _held_out(
+    bench: Bench, selection: Selection, holdout: Recording | ProcessedRecording | None, model: Model
+) -> HeldOut | None:
+    if holdout is None:
+        return None
+    robot = bench.robot
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        processed = wide_processing(holdout, robot, None)
+    if processed.period is None or processed.periods < 2:
+        return None
+    other = Bench(period_data(processed, robot), bench.effects)
+    start, final = selection.start.fit, selection.final.fit
+    before = other.predicted(start.effects, start.parameters)
+    after = other.predicted(final.effects, final.parameters)
+    now = settle_again(other, after)
+    transfers = assess.transfer(other, selection, now) if selection.added else []
+    return HeldOut(other, before, after, other.noise(after), transfers, processed.source, True)
+
+
+def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
+    """Statistic of a fit in the noise alone, its degrees of freedom, and the probability of as much by noise."""
+    plain = settled.noise.with_remainder(np.zeros_like(settled.noise.remainder))
+    statistic, dof = bench.statistic(settled.fit, plain), settled.fit.dof
+    freedom = plain.total_freedom * plain.equations
+    return statistic, dof, float(stats.f.sf(statistic / dof, dof, freedom))
+
+
+def _conclude(
+    model: Model,
+    bench: Bench,
+    selection: Selection,
+    trends: TrendTest,
+    alternatives: dict[int, tuple[Alternative, ...]],
+    held: HeldOut | None,
+    change: ParameterChange | None,
+    notes: check.Findings,
+    processed: ProcessedRecording,
+) -> Diagnosis:
+    start, final = selection.start, selection.final
+    statistic, dof, p_value = lack_of_fit(bench, start)
+    left, left_dof, left_p = lack_of_fit(bench, final)
+    plain = final.noise.with_remainder(np.zeros_like(final.noise.remainder))
+    remainder = needed_share(bench, final.fit, plain, 1.0) if left_p < LACK_LEVEL else 0.0
+    missing = [*_missing(bench, selection, alternatives, held), *(_missing_trend(bench, t) for t in trends.trends)]
+    if change is not None:
+        missing.extend(change.missing)
+    missing.sort(key=lambda m: -m.torque_share)
+    unexplained = max(left - left_dof, 0.0) / max(statistic - dof, 1.0) if selection.added else 1.0
+    verdict = _verdict(bench, missing, trends, change, remainder, unexplained, notes)
+    gap = gap_of(bench, start.fit, final.fit, final.noise)
+    held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
+    facts = words.Facts(
+        verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
+        periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
+    )  # fmt: skip
+    return Diagnosis(
+        verdict=verdict,
+        text=words.paragraph(facts),
+        lack_of_fit=LackOfFit(
+            statistic, dof, p_value, trends.p_value, _per_joint(bench, start.fit, start.noise), remainder
+        ),
+        locations=locate(bench, start.fit, start.noise),
+        missing=tuple(missing),
+        training=gap,
+        holdout=held_gap,
+        detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates),
+        warnings=tuple(dict.fromkeys((*notes.warnings, *words.reservations(facts, held is not None)))),
+        model=repaired_model(model, processed, final.fit),
+        waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
+        recording=bench.data.source,
+        holdout_source=None if held is None else held.source,
+    )
+
+
+def _verdict(
+    bench: Bench,
+    missing: list[MissingEffect],
+    trends: TrendTest,
+    change: ParameterChange | None,
+    remainder: float,
+    unexplained: float,
+    notes: check.Findings,
+) -> Verdict:
+    if notes.fatal:
+        return Verdict.CANNOT_TELL
+    structural = [m for m in missing if change is None or m not in change.missing]
+    large = remainder > LARGEST_REMAINDER
+    if not structural:
+        if large or trends.unnamed:
+            return Verdict.NOT_IN_LIBRARY if bench.data.periods >= FEWEST_PERIODS else Verdict.CANNOT_TELL
+        if change is not None and change.changed:
+            return Verdict.ONLY_AGAINST_REFERENCE
+        return Verdict.NONE
+    if any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
+        return Verdict.SUSPECT
+    if large and unexplained > UNEXPLAINED:
+        return Verdict.NOT_IN_LIBRARY
+    if any(m.alternatives for m in structural):
+        return Verdict.AMBIGUOUS
+    if large or trends.unnamed:
+        return Verdict.NAMED_WITH_REMAINDER
+    return Verdict.NAMED
+
+
+def _missing(
+    bench: Bench,
+    selection: Selection,
+    alternatives: dict[int, tuple[Alternative, ...]],
+    held: HeldOut | None,
+) -> list[MissingEffect]:
+    fit, noise = selection.final.fit, selection.final.noise
+    first = len(fit.effects) - selection.added
+    counts = bench.counts(fit.effects)
+    out = []
+    for k, position in enumerate(range(first, len(fit.effects))):
+        effect = fit.effects[position]
+        begin = sum(counts[:position])
+        columns = fit.columns[begin : begin + counts[position]]
+        parameters = [
+            MissingParameter(c.name, float(fit.values[begin + i]), fit.std(begin + i), c.unit)
+            for i, c in enumerate(columns)
+        ]
+        parameters.extend(_shape_parameters(bench, fit, position))
+        transfer = held.transfers[k] if held is not None and held.transfers else None
+        out.append(
+            MissingEffect(
+                effect=effect.name,
+                joint=effect.joint,
+                parameters=tuple(parameters),
+                torque_share=_torque_share(bench, fit, noise, position),
+                p_value=selection.p_values[k],
+                alternatives=alternatives.get(position, ()),
+                transfer=None if transfer is None or not transfer.tested else transfer.share,
+                detail=effect,
+                values=tuple(float(v) for v in fit.values[begin : begin + counts[position]]),
+            )
+        )
+    return out
+
+
+def _shape_parameters(bench: Bench, fit: Fit, position: int) -> list[MissingParameter]:
+    effect = fit.effects[position]
+    shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
+    out = []
+    for shape in shapes:
+        value = float(getattr(effect, shape.name))
+        std = 0.0
+        for k, (owner, free) in enumerate(fit.free_shapes):
+            if owner == position and free.name == shape.name:
+                step = fit.std(len(fit.columns) + k)
+                std = step * abs(value) if shape.logarithmic else step * (shape.upper - shape.lower)
+        out.append(
+            MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
+        )
+    return out
+
+
+def _torque_share(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> float:
+    """Largest rms of the torque of an effect in an equation, as a share of the rms torque of the motor there."""
+    effect = fit.effects[position]
+    if isinstance(effect, SignalEffect):
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        change = (
+            bench.predicted(others, fit.parameters).residual - bench.predicted(fit.effects, fit.parameters).residual
+        )
+    else:
+        change = assess.contribution(bench, fit, [position])
+    rms = np.sqrt(np.sum(np.abs(change) ** 2, axis=0))
+    return float(np.max(rms / np.maximum(bench.torque_rms, 1e-300)))
+
+
+def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
+    effect = trend.effect
+    parameters = [
+        MissingParameter(c.name, float(v), float(s), c.unit)
+        for c, v, s in zip(effect.columns(bench.robot), trend.values, trend.stds, strict=True)
+    ]
+    parameters.extend(
+        MissingParameter(effect.parameter_name(s.name), float(getattr(effect, s.name)), 0.0, s.unit)
+        for s in effect.shapes
+    )
+    others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
+    return MissingEffect(
+        effect=effect.name,
+        joint=effect.joint,
+        parameters=tuple(parameters),
+        torque_share=trend.torque_change,
+        p_value=trend.p_value,
+        alternatives=others,
+        detail=effect,
+        values=tuple(float(v) for v in trend.values),
+    )
+
+
+def _per_joint(bench: Bench, fit: Fit, noise: NoiseFloor) -> dict[str, dict[str, float]]:
+    """Energy of the residual over that of the noise by joint and equation."""
+    clean = np.sum(np.abs(bench.clean_residual(fit, noise)) ** 2, axis=0)
+    out: dict[str, dict[str, float]] = {joint: {} for joint in bench.robot.joint_names}
+    for e, equation in enumerate(bench.data.equations):
+        out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise.std[e] ** 2, 1e-300))
+    return out
+
+
+def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selection: Selection) -> Waveforms:
+    data = bench.data
+    labels = tuple(f"{eq.joint} {eq.kind}" for eq in data.equations)
+    explained: dict[str, FloatArray] = {}
+    first = len(after.effects) - selection.added
+    for position in range(first, len(after.effects)):
+        effect = after.effects[position]
+        label = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
+        explained[label] = waveform(assess.contribution(bench, after, [position]), data.samples)
+    return Waveforms(
+        time=data.motion.time - data.motion.time[0],
+        equations=labels,
+        before=waveform(bench.clean_residual(before, noise), data.samples),
+        after=waveform(bench.clean_residual(after, noise), data.samples),
+        noise=noise.std,
+        q=data.motion.q,
+        dtheta=data.motion.dtheta,
+        deflection=data.motion.deflection,
+        explained=explained,
+    )
+
+
+__all__ = ["DiagnosisError", "HeldOut", "PeriodData", "diagnose", "lack_of_fit", "model_effects", "replace"]

@@ -1,0 +1,441 @@
+"""What a diagnosis says, and DIAGNOSIS.json."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects import Effect, effect_from_dict
+from sea_ident.estimation import Model
+from sea_ident.exceptions import ModelFileError
+
+
+class Verdict(StrEnum):
+    """The outcome in a word."""
+
+    NONE = "none"
+    NAMED = "named"
+    NAMED_WITH_REMAINDER = "named_with_remainder"
+    AMBIGUOUS = "ambiguous"
+    SUSPECT = "suspect"
+    NOT_IN_LIBRARY = "not_in_library"
+    ONLY_AGAINST_REFERENCE = "only_against_reference"
+    CANNOT_TELL = "cannot_tell"
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """Whether the model leaves more than noise.
+
+    Attributes:
+        statistic: weighted sum of squares of the mean residual.
+        dof: its degrees of freedom.
+        p_value: probability of as much by noise alone.
+        trend_p_value: the same for a trend over the periods.
+        per_joint: statistic over degrees of freedom by joint and equation, 1 for noise alone.
+        remainder: share of the torque that the noise floor had to be raised by for the final model [-].
+    """
+
+    statistic: float
+    dof: int
+    p_value: float
+    trend_p_value: float
+    per_joint: Mapping[str, Mapping[str, float]]
+    remainder: float = 0.0
+
+
+@dataclass(frozen=True)
+class Location:
+    """A part of the motion in which model and data disagree.
+
+    Attributes:
+        joint: the joint.
+        equation: motor, link, sum, or spring where both change with opposite signs.
+        regime: which samples.
+        excess_rms: rms beyond the noise [N m].
+        z: how many standard deviations of the noise.
+    """
+
+    joint: str
+    equation: str
+    regime: str
+    excess_rms: float
+    z: float
+
+
+@dataclass(frozen=True)
+class MissingParameter:
+    """A parameter of an effect that is missing.
+
+    Attributes:
+        name: name.
+        value: value.
+        std: standard deviation.
+        unit: unit.
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What an effect could be taken for.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        cos2: share of the effect that it would explain as well [-].
+    """
+
+    effect: str
+    joint: str | None
+    cos2: float
+
+
+@dataclass(frozen=True)
+class MissingEffect:
+    """An effect that the model lacks.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        parameters: columns and shapes.
+        torque_share: rms of its torque over that of the motor [-].
+        p_value: probability of finding as much where nothing is missing.
+        alternatives: effects that explain the data as well.
+        transfer: share of what it explains on the held-out data that it explains with its parameters as they are;
+            None where that was not tested.
+        detail: the effect itself, with its shape.
+        values: values of its columns.
+    """
+
+    effect: str
+    joint: str | None
+    parameters: tuple[MissingParameter, ...]
+    torque_share: float
+    p_value: float
+    alternatives: tuple[Alternative, ...]
+    transfer: float | None = None
+    detail: Effect | None = None
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Rms beyond the noise per joint [N m].
+
+    Attributes:
+        before: of the model as it was, refitted.
+        after: of the model with the effects.
+        noise: rms of the noise of the mean.
+    """
+
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    noise: Mapping[str, float]
+
+    @property
+    def shrink(self) -> float:
+        """1 - after / before over all joints; 0 where there was none."""
+        before, after = (float(np.linalg.norm(list(part.values()))) for part in (self.before, self.after))
+        return 1.0 - after / before if before > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Detectability:
+    """What could have been seen of an effect.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        smallest: smallest value that would be found 19 times out of 20.
+        unit: its unit.
+        absorbed: share of the effect that the other parameters absorb [-].
+        confusable_with: effects (`name` or `name at joint`) that look like it in this motion.
+    """
+
+    effect: str
+    joint: str | None
+    smallest: float
+    unit: str
+    absorbed: float
+    confusable_with: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class NextExperiment:
+    """An experiment that tells two effects apart.
+
+    Attributes:
+        separates: the two, as `name at joint`.
+        excitation: what `Excitation.to_dict` gives.
+        gain: how much more of one lies outside the span of the other than in the present motion [-].
+    """
+
+    separates: tuple[str, str]
+    excitation: Mapping[str, Any]
+    gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class Waveforms:
+    """Mean residuals over a period, for pictures.
+
+    Attributes:
+        time: (N,) [s].
+        equations: (E,) labels `joint motor`, `joint link`, `joint sum`.
+        before: (N, E) residual of the refitted model [N m].
+        after: (N, E) residual with the effects [N m].
+        noise: (E,) rms of the noise [N m].
+        q: (N, n) link positions [rad].
+        dtheta: (N, n) motor velocities [rad/s].
+        deflection: (N, n) [rad].
+        explained: (N, E) torque of each missing effect, by its label [N m].
+    """
+
+    time: FloatArray
+    equations: tuple[str, ...]
+    before: FloatArray
+    after: FloatArray
+    noise: FloatArray
+    q: FloatArray
+    dtheta: FloatArray
+    deflection: FloatArray
+    explained: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Where a model and a recording disagree, and what is missing.
+
+    Attributes:
+        verdict: the outcome in a word.
+        text: one paragraph that a person can act on.
+        lack_of_fit: whether the model as it was, refitted, leaves more than noise.
+        locations: where, the strongest first.
+        missing: what, the largest torque first.
+        training: gap on the recording.
+        holdout: gap on the held-out recording (or held-out periods).
+        simulation_gap: of forward simulation by signal q, theta, tau; empty where it was not made.
+        detectability: what could have been seen.
+        next_experiment: what to do about an ambiguous pair.
+        warnings: what to know before trusting this.
+        model: the model with the effects; the refitted model where nothing was added; None where no fit was possible.
+        waveforms: for pictures.
+        recording: source of the recording.
+        holdout_source: source of the held-out data, None where there is none.
+    """
+
+    verdict: Verdict
+    text: str
+    lack_of_fit: LackOfFit
+    locations: tuple[Location, ...] = ()
+    missing: tuple[MissingEffect, ...] = ()
+    training: Gap | None = None
+    holdout: Gap | None = None
+    simulation_gap: Mapping[str, Gap] = field(default_factory=dict)
+    detectability: tuple[Detectability, ...] = ()
+    next_experiment: NextExperiment | None = None
+    warnings: tuple[str, ...] = ()
+    model: Model | None = None
+    waveforms: Waveforms | None = None
+    recording: str = ""
+    holdout_source: str | None = None
+
+    def summary(self) -> str:
+        """The paragraph, and the tables behind it."""
+        lines = [f"{self.verdict}: {self.text}"]
+        for m in self.missing:
+            where = f" at {m.joint}" if m.joint else ""
+            lines.append(f"  missing: {m.effect}{where}, {100 * m.torque_share:.2g} % of torque, p {m.p_value:.1e}")
+            lines.extend(f"    {p.name} {p.value:.4g} +- {p.std:.2g} {p.unit}" for p in m.parameters)
+            if m.alternatives:
+                others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)
+                lines.append(f"    or: {others}")
+        for label, gap in (("training", self.training), ("held out", self.holdout)):
+            if gap is not None:
+                parts = (
+                    f"{j} {gap.before[j]:.3g} -> {gap.after[j]:.3g} (noise {gap.noise[j]:.2g})" for j in gap.before
+                )
+                lines.append(f"  gap, {label}: {', '.join(parts)}; shrink {gap.shrink:.2f}")
+        lines.extend(
+            f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.1f}" for x in self.locations[:5]
+        )
+        lines.extend(f"  warning: {text}" for text in self.warnings)
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of DIAGNOSIS.json."""
+        empty = {"before": {}, "after": {}, "noise": {}}
+        return {
+            "verdict": str(self.verdict),
+            "summary": self.text,
+            "recording": self.recording,
+            "holdout": self.holdout_source,
+            "lack_of_fit": {
+                "statistic": self.lack_of_fit.statistic,
+                "dof": self.lack_of_fit.dof,
+                "p_value": self.lack_of_fit.p_value,
+                "trend_p_value": self.lack_of_fit.trend_p_value,
+                "remainder": self.lack_of_fit.remainder,
+                "per_joint": {joint: dict(parts) for joint, parts in self.lack_of_fit.per_joint.items()},
+            },
+            "locations": [
+                {"joint": x.joint, "equation": x.equation, "regime": x.regime, "excess_rms": x.excess_rms, "z": x.z}
+                for x in self.locations
+            ],
+            "missing": [_missing_to_dict(m) for m in self.missing],
+            "gap": {
+                "training": empty if self.training is None else _gap_to_dict(self.training),
+                "holdout": None if self.holdout is None else _gap_to_dict(self.holdout),
+                "shrink_training": None if self.training is None else self.training.shrink,
+                "shrink_holdout": None if self.holdout is None else self.holdout.shrink,
+            },
+            "simulation_gap": {kind: _gap_to_dict(gap) for kind, gap in self.simulation_gap.items()},
+            "detectability": [
+                {
+                    "effect": d.effect, "joint": d.joint, "smallest": d.smallest if np.isfinite(d.smallest) else None,
+                    "unit": d.unit, "absorbed": d.absorbed, "confusable_with": list(d.confusable_with),
+                }
+                for d in self.detectability
+            ],
+            "next_experiment": None
+            if self.next_experiment is None
+            else {
+                "separates": list(self.next_experiment.separates),
+                "excitation": dict(self.next_experiment.excitation),
+                "gain": self.next_experiment.gain,
+            },
+            "warnings": list(self.warnings),
+            "waveforms": None if self.waveforms is None else _waveforms_to_dict(self.waveforms),
+        }  # fmt: skip
+
+    def save(self, path: str | Path) -> None:
+        """Write DIAGNOSIS.json; the file is complete or does not appear.
+
+        Raises:
+            ModelFileError: if it cannot be written.
+        """
+        target = Path(path)
+        partial = target.with_name(target.name + ".part")
+        try:
+            partial.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            partial.replace(target)
+        except OSError as error:
+            raise ModelFileError(f"{target}: the diagnosis cannot be written: {error}") from error
+
+
+def read_diagnosis(path: str | Path) -> Diagnosis:
+    """Read DIAGNOSIS.json; the model is not in it.
+
+    Raises:
+        ModelFileError: if it cannot be read or is no diagnosis.
+    """
+    try:
+        record = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ModelFileError(f"{path}: the diagnosis cannot be read: {error}") from error
+    try:
+        return _from_dict(record)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ModelFileError(f"{path}: not a diagnosis ({type(error).__name__}: {error})") from error
+
+
+def _missing_to_dict(m: MissingEffect) -> dict[str, Any]:
+    return {
+        "effect": m.effect,
+        "joint": m.joint,
+        "parameters": [{"name": p.name, "value": p.value, "std": p.std, "unit": p.unit} for p in m.parameters],
+        "torque_share": m.torque_share,
+        "p_value": m.p_value,
+        "alternatives": [{"effect": a.effect, "joint": a.joint, "cos2": a.cos2} for a in m.alternatives],
+        "transfer": m.transfer,
+        "detail": None if m.detail is None else m.detail.to_dict(),
+        "values": list(m.values),
+    }
+
+
+def _gap_to_dict(gap: Gap) -> dict[str, Any]:
+    return {"before": dict(gap.before), "after": dict(gap.after), "noise": dict(gap.noise)}
+
+
+def _waveforms_to_dict(w: Waveforms) -> dict[str, Any]:
+    thin = slice(None, None, max(1, len(w.time) // 500))
+    return {
+        "time": w.time[thin].tolist(),
+        "equations": list(w.equations),
+        "before": w.before[thin].tolist(),
+        "after": w.after[thin].tolist(),
+        "noise": w.noise.tolist(),
+        "q": w.q[thin].tolist(),
+        "dtheta": w.dtheta[thin].tolist(),
+        "deflection": w.deflection[thin].tolist(),
+        "explained": {name: values[thin].tolist() for name, values in w.explained.items()},
+    }
+
+
+def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
+    lack, gap = record["lack_of_fit"], record["gap"]
+    after = record.get("next_experiment")
+    waves = record.get("waveforms")
+    training = _gap_from_dict(gap["training"])
+    return Diagnosis(
+        verdict=Verdict(record["verdict"]),
+        text=record["summary"],
+        lack_of_fit=LackOfFit(
+            lack["statistic"], lack["dof"], lack["p_value"], lack["trend_p_value"], lack["per_joint"],
+            lack.get("remainder", 0.0),
+        ),
+        locations=tuple(Location(**x) for x in record["locations"]),
+        missing=tuple(_missing_from_dict(m) for m in record["missing"]),
+        training=training if training is not None and training.before else None,
+        holdout=_gap_from_dict(gap["holdout"]),
+        simulation_gap={k: Gap(**g) for k, g in record["simulation_gap"].items()},
+        detectability=tuple(
+            Detectability(
+                d["effect"], d["joint"], float("inf") if d["smallest"] is None else d["smallest"], d["unit"],
+                d["absorbed"], tuple(d["confusable_with"]),
+            )
+            for d in record["detectability"]
+        ),
+        next_experiment=None
+        if after is None
+        else NextExperiment((after["separates"][0], after["separates"][1]), after["excitation"], after["gain"]),
+        warnings=tuple(record["warnings"]),
+        waveforms=None if waves is None else _waveforms_from_dict(waves),
+        recording=record.get("recording", ""),
+        holdout_source=record.get("holdout"),
+    )  # fmt: skip
+
+
+def _missing_from_dict(m: Mapping[str, Any]) -> MissingEffect:
+    return MissingEffect(
+        effect=m["effect"],
+        joint=m["joint"],
+        parameters=tuple(MissingParameter(**p) for p in m["parameters"]),
+        torque_share=m["torque_share"],
+        p_value=m["p_value"],
+        alternatives=tuple(Alternative(**a) for a in m["alternatives"]),
+        transfer=m.get("transfer"),
+        detail=None if m.get("detail") is None else effect_from_dict(m["detail"]),
+        values=tuple(m.get("values", ())),
+    )
+
+
+def _gap_from_dict(record: Mapping[str, Any] | None) -> Gap | None:
+    return None if record is None else Gap(record["before"], record["after"], record["noise"])
+
+
+def _waveforms_from_dict(w: Mapping[str, Any]) -> Waveforms:
+    arrays = {name: np.asarray(w[name], dtype=np.float64)
+              for name in ("time", "before", "after", "noise", "q", "dtheta", "deflection")}  # fmt: skip
+    explained = {name: np.asarray(values, dtype=np.float64) for name, values in w["explained"].items()}
+    return Waveforms(equations=tuple(w["equations"]), explained=explained, **arrays)

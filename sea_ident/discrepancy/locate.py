@@ -1,0 +1,80 @@
+"""Where model and data disagree: by joint, equation and part of the motion."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.data import EquationKind, waveform
+from sea_ident.discrepancy.diagnosis import Location
+from sea_ident.discrepancy.noise import NoiseFloor
+
+SIGNIFICANT = 5.0
+"""Locations below this z-score are not told."""
+
+MOST = 60
+"""Largest number of locations told."""
+
+
+def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
+    """Excess energy of the mean residual by joint, equation and regime, the strongest first."""
+    data = bench.data
+    residual = waveform(bench.clean_residual(fit, noise), data.samples)
+    found = []
+    numbers = 2 * data.harmonics + 1
+    for e, equation in enumerate(data.equations):
+        keep = ~data.left_out[:, e]
+        variance = float(noise.std[e] ** 2)
+        for regime, chosen in regimes(bench, equation.index).items():
+            part = chosen & keep
+            count = numbers * float(np.count_nonzero(part)) / data.samples
+            if count < 4.0:
+                continue
+            power = float(np.mean(residual[part, e] ** 2))
+            z = (power / variance - 1.0) * np.sqrt(count / 2.0)
+            if z > SIGNIFICANT:
+                label = _label(bench, residual, e, part)
+                found.append(Location(equation.joint, label, regime, float(np.sqrt(power - variance)), float(z)))
+    return tuple(sorted(found, key=lambda x: -x.z)[:MOST])
+
+
+def regimes(bench: Bench, joint: int) -> dict[str, NDArray[np.bool_]]:
+    """(N,) samples of each part of the motion of a joint."""
+    motion = bench.data.motion
+    speed, q = motion.dtheta[:, joint], motion.q[:, joint]
+    torque = bench.data.tau_motor[:, joint]
+    fast = float(np.max(np.abs(speed)))
+    out: dict[str, NDArray[np.bool_]] = {
+        "all": np.ones(len(motion), dtype=np.bool_),
+        "near reversal": np.abs(speed) < 0.1 * fast,
+        "slow": np.abs(speed) < 0.3 * fast,
+        "fast": np.abs(speed) > 0.6 * fast,
+        "forwards": speed > 0.0,
+        "backwards": speed < 0.0,
+        "low load": np.abs(torque) < np.quantile(np.abs(torque), 1 / 3),
+        "high load": np.abs(torque) > np.quantile(np.abs(torque), 2 / 3),
+        "low position": q < np.quantile(q, 1 / 3),
+        "middle position": (q >= np.quantile(q, 1 / 3)) & (q <= np.quantile(q, 2 / 3)),
+        "high position": q > np.quantile(q, 2 / 3),
+    }
+    if bench.robot.elastic[joint]:
+        deflection = np.abs(motion.deflection[:, joint])
+        out["small deflection"] = deflection < np.quantile(deflection, 1 / 3)
+        out["large deflection"] = deflection > np.quantile(deflection, 2 / 3)
+    eighth = (np.arange(len(motion)) * 8) // len(motion)
+    period = bench.data.period
+    for k in range(8):
+        out[f"time {k * period / 8:.3g} to {(k + 1) * period / 8:.3g} s"] = eighth == k
+    return out
+
+
+def _label(bench: Bench, residual: FloatArray, equation: int, part: NDArray[np.bool_]) -> str:
+    """`spring` where the other equation of the joint shows the same with the opposite sign."""
+    own = bench.data.equations[equation]
+    for e, other in enumerate(bench.data.equations):
+        if other.joint == own.joint and other.kind is not own.kind and EquationKind.SUM not in (own.kind, other.kind):
+            a, b = residual[part, equation], residual[part, e]
+            size = float(np.linalg.norm(a) * np.linalg.norm(b))
+            if size > 0.0 and float(a @ b) / size < -0.8:
+                return "spring"
+    return str(own.kind)

@@ -1,0 +1,243 @@
+"""What changes from period to period, and is invisible in the mean."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit, whiten
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.effects import Effect, effect_classes
+from sea_ident.effects.drift import TrendEffect
+from sea_ident.exceptions import EffectError
+
+LEVEL = 1e-3
+"""Probability of naming a trend where there is none."""
+
+MOST_TRENDS = 2
+"""Largest number of trends that are named."""
+
+SMALLEST_CHANGE = 1e-3
+"""A trend must change the torque of an equation by this share of its rms over the recording, or it does not matter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """A trend over the periods.
+
+    Attributes:
+        effect: the effect.
+        values: (k,) its parameters.
+        stds: (k,) their standard deviations.
+        gain: drop of the statistic of the comparison of periods.
+        p_value: corrected for all that was tried.
+        torque_change: rms over periods of the change, as a share of the torque [-].
+        alternatives: others that explain the same, with the share of it that they explain.
+    """
+
+    effect: Effect
+    values: FloatArray
+    stds: FloatArray
+    gain: float
+    p_value: float
+    torque_change: float
+    alternatives: tuple[tuple[Effect, float], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class TrendTest:
+    """Outcome of the comparison of periods.
+
+    Attributes:
+        p_value: of no trend at all.
+        trends: what is named, the strongest first.
+        unnamed: whether a trend remains that no effect of the library explains.
+    """
+
+    p_value: float
+    trends: tuple[Trend, ...]
+    unnamed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Direction:
+    """A trend as columns: profile over the periods, and orthonormal whitened columns."""
+
+    effect: Effect
+    profile: FloatArray
+    columns: FloatArray
+    basis: FloatArray
+
+
+def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: FloatArray | None = None) -> TrendTest:
+    """Test the residuals of the periods for a trend, and name it.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        noise: its noise floor.
+        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+
+    Returns:
+        The trends.
+    """
+    periods = bench.data.periods
+    if periods < 4:
+        return TrendTest(1.0, (), False)
+    residuals = bench.period_residuals(fit)
+    whitener, free = bench.whitener(noise.with_remainder(np.zeros_like(noise.remainder))), bench.free_basis(noise)
+    # whitened for the residual of one period: its variance is that of the mean times the number of periods
+    flat = np.stack([whiten(whitener, residual) for residual in residuals]) / np.sqrt(periods)
+    flat = flat - (flat @ free) @ free.T
+    flat -= flat.mean(axis=0)
+    middle = (np.arange(periods) + 0.5) * bench.data.period
+    directions = _directions(bench, fit, whitener / np.sqrt(periods), free, middle, temperature)
+    omnibus = _omnibus(flat, middle, noise)
+    tests = max(len(directions), 1)
+    named: list[tuple[_Direction, float, float]] = []
+    left = flat
+    while len(named) < MOST_TRENDS and directions:
+        gains = [_gain(left, d) for d in directions]
+        best = int(np.argmax(gains))
+        p_value = _p_value(gains[best], directions[best].basis.shape[1], tests, noise)
+        if p_value > LEVEL or _change(bench, left, directions[best], periods) < SMALLEST_CHANGE:
+            break
+        named.append((directions[best], gains[best], p_value))
+        left = flat - _explained(flat, [d for d, _, _ in named])
+    column_p = min((p for _, _, p in named), default=1.0)
+    if not named and directions:
+        gains = [_gain(flat, d) for d in directions]
+        best = int(np.argmax(gains))
+        column_p = _p_value(gains[best], directions[best].basis.shape[1], tests, noise)
+    trends = tuple(
+        _trend(bench, flat, d, gain, p, directions, [o for o, _, _ in named if o is not d]) for d, gain, p in named
+    )
+    unnamed = _omnibus(left, middle, noise) < LEVEL if named else omnibus < LEVEL
+    return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed)
+
+
+def trend_effects(bench: Bench) -> list[Effect]:
+    """Every trend of the library at every joint."""
+    found: list[Effect] = []
+    for _, kind in sorted(effect_classes().items()):
+        if issubclass(kind, TrendEffect):
+            found.extend(kind.instances(bench.robot))
+    return found
+
+
+def _directions(
+    bench: Bench,
+    fit: Fit,
+    whitener: ComplexArray,
+    free: FloatArray,
+    middle: FloatArray,
+    temperature: FloatArray | None,
+) -> list[_Direction]:
+    state = bench.state(fit.effects)
+    found = []
+    for plain in trend_effects(bench):
+        effect = bench.anchored((*fit.effects, plain), fit.parameters)[-1]
+        if not isinstance(effect, TrendEffect):
+            continue
+        own = None
+        if temperature is not None and effect.joint is not None:
+            own = temperature[:, bench.robot.index(effect.joint)]
+        try:
+            spectra = bench.spectra_of(effect.steady(state), fit.effects) * fit.scale[:, None]
+            variants = [replace(effect, time_constant=c) for c in _time_constants(effect, middle)]
+            changes = [v.change(middle, own) for v in variants]
+        except EffectError:
+            continue
+        columns = whiten(whitener, spectra)
+        columns = columns - free @ (free.T @ columns)
+        norms = np.linalg.norm(columns, axis=0)
+        if not np.all(norms > 0.0):
+            continue
+        basis = np.linalg.qr(columns / norms)[0]
+        for variant, change in zip(variants, changes, strict=True):
+            profile = change - change.mean()
+            if np.linalg.norm(profile) > 1e-12:
+                found.append(_Direction(variant, profile, columns, basis))
+    return found
+
+
+def _time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]:
+    """Time constants worth trying in a recording of this length."""
+    if not any(shape.name == "time_constant" for shape in getattr(effect, "shapes", ())):
+        return (getattr(effect, "time_constant", 0.0),)
+    length = float(middle[-1] + middle[0])
+    return tuple(float(c) for c in (0.1 * length, 0.2 * length, 0.4 * length, 0.8 * length, 20.0 * length))
+
+
+def _gain(flat: FloatArray, direction: _Direction) -> float:
+    along = direction.profile @ (flat @ direction.basis) / np.linalg.norm(direction.profile)
+    return float(along @ along)
+
+
+def _explained(flat: FloatArray, directions: list[_Direction]) -> FloatArray:
+    """Part of the residuals (P, M) that several trends explain together."""
+    columns = [np.outer(d.profile / np.linalg.norm(d.profile), b).ravel() for d in directions for b in d.basis.T]
+    basis = np.linalg.qr(np.stack(columns, axis=1))[0]
+    explained: FloatArray = (basis @ (basis.T @ flat.ravel())).reshape(flat.shape)
+    return explained
+
+
+def _p_value(gain: float, columns: int, tests: int, noise: NoiseFloor) -> float:
+    return min(1.0, tests * float(stats.f.sf(gain / columns, columns, max(noise.total_freedom, 4.0))))
+
+
+def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
+    """Probability of the linear trend in everything at once."""
+    profile = middle - middle.mean()
+    along = profile @ flat / np.linalg.norm(profile)
+    dof = max(int(np.count_nonzero(np.abs(along) > 0.0)), 1)
+    ratio = float(along @ along) / dof
+    return float(stats.f.sf(ratio, dof, max(noise.total_freedom * noise.equations, 4.0)))
+
+
+def _change(bench: Bench, flat: FloatArray, direction: _Direction, periods: int) -> float:
+    """Rms over the periods of the change of the torque, as a share of the torque of its equation."""
+    values = _values(flat, direction)
+    state = bench.state(())
+    rows = bench.data.rows(direction.effect.steady(state)) @ values  # type: ignore[attr-defined]
+    spread = np.sqrt(np.mean(direction.profile**2))
+    return float(np.max(np.sqrt(np.mean(rows**2, axis=0)) * spread / np.maximum(bench.torque_rms, 1e-300)))
+
+
+def _values(flat: FloatArray, direction: _Direction) -> FloatArray:
+    along = direction.profile @ flat / float(direction.profile @ direction.profile)
+    return np.asarray(np.linalg.lstsq(direction.columns, along, rcond=1e-10)[0], dtype=np.float64)
+
+
+def _trend(
+    bench: Bench,
+    flat: FloatArray,
+    direction: _Direction,
+    gain: float,
+    p_value: float,
+    directions: list[_Direction],
+    others: list[_Direction],
+) -> Trend:
+    left = flat - _explained(flat, others) if others else flat
+    inverse = np.linalg.pinv(direction.columns)
+    size = np.linalg.norm(direction.profile)
+    alternatives: dict[tuple[str, str | None], tuple[Effect, float]] = {}
+    explained = _explained(left, [direction])
+    for other in directions:
+        key = (other.effect.name, other.effect.joint)
+        if key == (direction.effect.name, direction.effect.joint):
+            continue
+        share = float(np.sum(_explained(explained, [other]) ** 2) / np.sum(explained**2))
+        lost = gain - _gain(left, other)
+        if lost < 14.0 and share > alternatives.get(key, (other.effect, 0.0))[1]:
+            alternatives[key] = (other.effect, share)
+    return Trend(
+        effect=direction.effect,
+        values=_values(left, direction),
+        stds=np.linalg.norm(inverse, axis=1) / size,
+        gain=gain,
+        p_value=p_value,
+        torque_change=_change(bench, left, direction, len(flat)),
+        alternatives=tuple(sorted(alternatives.values(), key=lambda a: -a[1])),
+    )

@@ -1,0 +1,104 @@
+"""A diagnosis in words."""
+
+from dataclasses import dataclass
+
+from sea_ident.discrepancy.diagnosis import Gap, MissingEffect, Verdict
+from sea_ident.discrepancy.reference import ParameterChange
+from sea_ident.discrepancy.trend import TrendTest
+
+FEW_PERIODS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """What the words are made of.
+
+    Attributes:
+        verdict: the outcome.
+        missing: what is missing, the largest torque first.
+        gap: on the recording.
+        held: on held-out data.
+        remainder: share of the torque that is left [-].
+        periods: P.
+        p_value: of the lack of fit.
+        trend: comparison of periods.
+        change: against a reference.
+    """
+
+    verdict: Verdict
+    missing: tuple[MissingEffect, ...]
+    gap: Gap
+    held: Gap | None
+    remainder: float
+    periods: int
+    p_value: float
+    trend: TrendTest
+    change: ParameterChange | None
+
+
+def paragraph(facts: Facts) -> str:
+    """One paragraph that a person can act on."""
+    parts = [_opening(facts)]
+    if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
+        worst = max(facts.gap.before, key=lambda j: facts.gap.before[j])
+        parts.append(
+            f"With it the gap on this recording goes from {facts.gap.before[worst]:.3g} to {facts.gap.after[worst]:.3g} "
+            f"N m at {worst}, where it was largest."
+        )
+        if facts.held is not None:
+            parts.append(f"On held-out data the gap shrinks by {100 * facts.held.shrink:.0f} %.")
+    if facts.remainder > 0.0:
+        parts.append(f"A remainder of {100 * facts.remainder:.2g} % of the torque has no name.")
+    if facts.verdict is Verdict.AMBIGUOUS:
+        pair = next(m for m in facts.missing if m.alternatives)
+        parts.append(
+            f"To tell {_name(pair)} from {pair.alternatives[0].effect} at {pair.alternatives[0].joint}, record the "
+            "motion that the next experiment proposes."
+        )
+    if facts.verdict is Verdict.SUSPECT:
+        parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
+    return " ".join(parts)
+
+
+def reservations(facts: Facts, held_out: bool) -> list[str]:
+    """What to know before trusting the diagnosis."""
+    found = []
+    if facts.periods < FEW_PERIODS:
+        found.append(
+            f"{facts.periods} periods only: the noise floor is uncertain and small effects are not told from it; "
+            f"record {FEW_PERIODS} or more"
+        )
+    if facts.missing and not held_out:
+        found.append("no held-out motion was given: what is named was not tested on another motion")
+    if facts.trend.unnamed:
+        found.append("the periods show a trend that no effect of the library explains")
+    return found
+
+
+def _name(m: MissingEffect) -> str:
+    return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
+
+
+def _opening(facts: Facts) -> str:
+    names = ", ".join(f"{_name(m)} ({100 * m.torque_share:.2g} % of torque)" for m in facts.missing)
+    match facts.verdict:
+        case Verdict.NONE:
+            return f"Nothing is missing that {facts.periods} periods could show (lack of fit p = {facts.p_value:.2g})."
+        case Verdict.NAMED | Verdict.NAMED_WITH_REMAINDER:
+            return f"The model lacks {names}."
+        case Verdict.AMBIGUOUS:
+            others = "; ".join(
+                f"{_name(m)} or {', '.join(f'{a.effect} at {a.joint}' for a in m.alternatives)}"
+                for m in facts.missing
+                if m.alternatives
+            )
+            return f"The model lacks {names}; this motion does not tell {others} apart."
+        case Verdict.SUSPECT:
+            return f"Something is missing; it looks like {names}, but that does not hold on other data."
+        case Verdict.NOT_IN_LIBRARY:
+            near = f" The nearest is {names}, which is no full explanation." if names else ""
+            return f"Something is missing that is not in the library.{near}"
+        case Verdict.ONLY_AGAINST_REFERENCE:
+            return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."
+        case _:
+            return "This recording does not allow a conclusion."
