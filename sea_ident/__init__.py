@@ -34,6 +34,9 @@ _HOME = {
     "identify_batch": "batch",
     "run_demo": "demo",
     "write_report": "report",
+    "Diagnosis": "discrepancy",
+    "diagnose": "discrepancy",
+    "read_diagnosis": "discrepancy",
     "export_mjcf": "export",
     "export_urdf": "export",
     "SeaIdentError": "exceptions",
@@ -43,6 +46,7 @@ _HOME = {
 __all__ = [
     "ClockAlignment",
     "ColumnSource",
+    "Diagnosis",
     "Excitation",
     "FourierSeries",
     "Model",
@@ -56,6 +60,7 @@ __all__ = [
     "Validation",
     "build_regressor",
     "design_excitation",
+    "diagnose",
     "export_mjcf",
     "export_urdf",
     "find_base_parameters",
@@ -64,6 +69,7 @@ __all__ = [
     "identify_springs",
     "load_robot",
     "process",
+    "read_diagnosis",
     "read_excitation",
     "read_model",
     "read_recording",
@@ -78,6 +84,7 @@ if TYPE_CHECKING:
     from sea_ident.base_parameters import find_base_parameters
     from sea_ident.batch import identify_batch
     from sea_ident.demo import run_demo
+    from sea_ident.discrepancy import Diagnosis, diagnose, read_diagnosis
     from sea_ident.estimation import Model, identify, identify_springs, read_model
     from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
     from sea_ident.excitation import Excitation, design_excitation, read_excitation
