@@ -14,6 +14,7 @@ from tests.benchmarks.hidden_effects.plants import Truth
 from tests.benchmarks.hidden_effects.sensors import signals
 
 BANDWIDTH = 15.0
+AROUND_REVERSALS = 3
 TREND_EFFECTS = ("friction_drift", "temperature_friction", "torque_constant_drift", "stiffness_drift")
 SENSOR_EFFECTS = ("encoder_offset", "encoder_eccentricity", "position_delay")
 ABSORBED_EFFECTS = ("payload", "common_torque_constant", "changed_inertia")
@@ -29,14 +30,17 @@ def base_model(robot: Robot, smoothing: float) -> tuple[Effect, ...]:
 
 
 def base_residual(
-    robot: Robot, clean: dict[str, FloatArray], motion: Motion | None, period: float, smoothing: float
+    robot: Robot, clean: dict[str, FloatArray], exact: Motion, sensed: bool, period: float, smoothing: float
 ) -> tuple[FloatArray, FloatArray]:
-    """What the base model leaves of one noise-free period, band-limited.
+    """What the base model leaves of one noise-free period, reversals of the motors left out.
+
+    What an effect does within a few samples of a reversal cannot be seen in a recording, so it does not count.
 
     Args:
         robot: the robot; its numbers are not used.
         clean: signals (N, n) of one period.
-        motion: exact motion; None to differentiate the signals, where a sensor shows another motion.
+        exact: motion.
+        sensed: whether the model sees the motion of the signals, band-limited and differentiated, not the exact one.
         period: [s].
         smoothing: of the friction [rad/s].
 
@@ -45,31 +49,34 @@ def base_residual(
         their whole residual in the motor row.
     """
     samples = len(clean["q"])
-    keep = np.arange(samples // 2 + 1) <= BANDWIDTH * period
 
     def smooth(values: FloatArray, order: int = 0) -> FloatArray:
-        spectrum = np.fft.rfft(values, axis=0)
         w = 2j * np.pi * np.arange(samples // 2 + 1) / period
-        window = (keep * w**order).reshape(-1, *([1] * (values.ndim - 1)))
-        return np.fft.irfft(spectrum * window, samples, axis=0)
+        window = ((np.abs(w) <= 2.0 * np.pi * BANDWIDTH) * w**order).reshape(-1, *([1] * (values.ndim - 1)))
+        return np.fft.irfft(np.fft.rfft(values, axis=0) * window, samples, axis=0)
 
-    time = np.arange(samples) * (period / samples)
-    if motion is None:
+    motion = exact
+    if sensed:
+        time = np.arange(samples) * (period / samples)
         q, theta = ([smooth(clean[name], d) for d in range(3)] for name in ("q", "theta"))
         motion = Motion(time, *q, *theta)
     regressor = build_regressor(robot, base_model(robot, smoothing), motion)
-    tau = smooth(clean["tau_motor"])
+    tau = clean["tau_motor"]
     scale = np.sqrt(np.mean(tau**2, axis=0))
     elastic = np.array(robot.elastic, dtype=bool)
     motor = np.where(elastic[None, :, None], regressor.motor, regressor.sum)
-    link = regressor.link[:, elastic]
-    rows = np.concatenate([smooth(motor) / scale[:, None], smooth(link) / scale[elastic][:, None]], axis=1)
+    rows = np.concatenate([motor / scale[:, None], (regressor.link / scale[:, None])[:, elastic]], axis=1)
     target = np.concatenate([tau / scale, np.zeros((samples, int(elastic.sum())))], axis=1)
-    matrix = rows.reshape(-1, rows.shape[2])
+    if sensed:
+        rows, target = smooth(rows), smooth(target)
+    turning = np.sign(exact.dtheta) != np.sign(np.roll(exact.dtheta, 1, axis=0))
+    near = np.any([np.roll(turning, k, axis=0) for k in range(-AROUND_REVERSALS, AROUND_REVERSALS)], axis=0)
+    used = ~np.concatenate([near, near[:, elastic]], axis=1)
+    matrix, wanted = rows[used], target[used]
     norms = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
-    solution = np.linalg.lstsq(matrix / norms, target.ravel(), rcond=1e-9)[0]
-    residual = (target.ravel() - matrix @ (solution / norms)).reshape(target.shape)
-    rms = np.sqrt(np.mean(residual**2, axis=0))
+    solution = np.linalg.lstsq(matrix / norms, wanted, rcond=1e-9)[0]
+    residual = np.where(used, target - rows @ (solution / norms), 0.0)
+    rms = np.sqrt(np.sum(residual**2, axis=0) / used.sum(axis=0))
     links = np.zeros(robot.n)
     links[elastic] = rms[robot.n :]
     return links, rms[: robot.n]
@@ -89,15 +96,14 @@ class Gauge:
         self.friction = replace(friction, jitter=0.0)
         self.exact = self._simulate(())
         self.clean = signals(self.exact, truth, ())
-        self.floors = {
-            exact: self._residual(self.clean, self.exact.motion if exact else None) for exact in (True, False)
-        }
+        self.floors = {sensed: self._residual(self.clean, self.exact, sensed) for sensed in (False, True)}
 
     def _simulate(self, planted: tuple[Planted, ...]) -> Exact:
         return simulate_mujoco(self.truth, self.series, 1, planted=planted, friction=self.friction, settle=self.settle)
 
-    def _residual(self, clean: dict[str, FloatArray], motion: Motion | None) -> FloatArray:
-        return np.stack(base_residual(self.truth.robot, clean, motion, self.series.period, self.friction.smoothing))
+    def _residual(self, clean: dict[str, FloatArray], exact: Exact, sensed: bool) -> FloatArray:
+        smoothing, robot = self.friction.smoothing, self.truth.robot
+        return np.stack(base_residual(robot, clean, exact.motion, sensed, self.series.period, smoothing))
 
     def torque_rms(self) -> FloatArray:
         """(n,) rms of the motor torques [N m]."""
@@ -116,9 +122,8 @@ class Gauge:
         clean = signals(exact, self.truth, (planted,))
         change = np.sqrt(np.mean((clean["tau_motor"] - self.clean["tau_motor"]) ** 2, axis=0)) / self.torque_rms()
         share = float(change.max())
-        known = planted.effect not in SENSOR_EFFECTS
-        residual = self._residual(clean, exact.motion if known else None)
-        excess = np.sqrt(np.maximum(residual**2 - self.floors[known] ** 2, 0.0))
+        sensed = planted.effect in SENSOR_EFFECTS
+        excess = np.sqrt(np.maximum(self._residual(clean, exact, sensed) ** 2 - self.floors[sensed] ** 2, 0.0))
         gap = share if planted.effect in ABSORBED_EFFECTS else float(excess.max())
         return replace(planted, gap=gap, torque_share=share)
 
