@@ -1,14 +1,11 @@
 """What a report is about."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.estimation import Model
 from sea_ident.excitation import Excitation
 from sea_ident.validation import Validation
-
-if TYPE_CHECKING:
-    from sea_ident.discrepancy import Diagnosis
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,13 +13,13 @@ class Content:
     """Model, diagnosis and data of one report.
 
     Attributes:
-        model: the model.
+        model: the model, None where there is a diagnosis alone.
         excitation: the motion that the robot was asked for, None where not given.
         validations: comparisons with recordings that were not used in the fit.
-        diagnosis: what is missing in the model, None where it was not diagnosed.
+        diagnosis: what is missing in a model, None where it was not diagnosed.
     """
 
-    model: Model
+    model: Model | None = None
     excitation: Excitation | None = None
     validations: tuple[Validation, ...] = ()
-    diagnosis: "Diagnosis | None" = None
+    diagnosis: Diagnosis | None = None

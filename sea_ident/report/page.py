@@ -11,10 +11,11 @@ from markupsafe import Markup
 
 import sea_ident
 from sea_ident.atomic import atomic_file
+from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.estimation import Model
 from sea_ident.excitation import Excitation
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import DiagnosisSection, ModelSection
 from sea_ident.report.sections import SECTIONS
 from sea_ident.validation import Validation
 
@@ -53,7 +54,7 @@ def _superscript(value: int) -> str:
 
 
 def write_report(
-    result: Model,
+    result: Model | Diagnosis,
     path: str | Path,
     *,
     excitation: Excitation | None = None,
@@ -62,7 +63,7 @@ def write_report(
     """Write a report: one HTML file without any reference to the network.
 
     Args:
-        result: what to report on.
+        result: what to report on. A diagnosis brings the repaired model with it, unless it was read from a file.
         path: file to write; it is complete or does not appear.
         excitation: trajectory that the robot was asked for, shown in its limits.
         validations: comparisons with recordings that were not used in the fit.
@@ -70,7 +71,10 @@ def write_report(
     Raises:
         OutputError: the file cannot be written.
     """
-    content = Content(result, excitation, tuple(validations))
+    if isinstance(result, Diagnosis):
+        content = Content(result.model, excitation, tuple(validations), result)
+    else:
+        content = Content(result, excitation, tuple(validations))
     text = render(content)
     with atomic_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -88,22 +92,38 @@ def render(content: Content) -> str:
         return Markup(loader.get_source(environment, name)[0])
 
     rendered: list[_Rendered] = []
-    absent: list[Section] = []
+    absent: dict[str, list[str]] = {}
     for section in SECTIONS:
         context = section.context(content)
-        if context is None:
-            absent.append(section)
-        else:
+        if context is not None:
             body = environment.get_template(f"{section.key}.html").render(context)
             rendered.append(_Rendered(section.key, section.title, Markup(body)))
-    model = content.model
+        elif content.diagnosis is not None or not isinstance(section, DiagnosisSection):
+            lacks = "a model" if content.model is None and isinstance(section, ModelSection) else section.needs
+            absent.setdefault(lacks, []).append(section.title.lower())
+    title, subtitle = _headings(content)
     return environment.get_template("page.html").render(
-        title=f"{model.robot.name}: identified model",
-        subtitle=f"{model.robot.n} joints, {len(model.springs)} springs; from {Path(model.recording).name} "
-        f"by {model.estimator.replace('_', ' ')}",
+        title=title,
+        subtitle=subtitle,
         css=source("page.css"),
         js=source("page.js") + Markup("\n") + source("viewer.js"),
         sections=rendered,
         absent=absent,
         version=sea_ident.__version__,
     )
+
+
+def _headings(content: Content) -> tuple[str, str]:
+    model, diagnosis = content.model, content.diagnosis
+    about = ""
+    if model is not None:
+        about = (
+            f"{model.robot.n} joints, {len(model.springs)} springs; from {Path(model.recording).name} by "
+            f"{model.estimator.replace('_', ' ')}"
+        )
+    if diagnosis is None:
+        return (f"{model.robot.name}: identified model" if model is not None else "Report"), about
+    data = Path(diagnosis.recording).name or "a recording"
+    held_out = "" if diagnosis.holdout_source is None else f", held out {Path(diagnosis.holdout_source).name}"
+    name = "" if model is None else f"{model.robot.name}: "
+    return f"{name}what the model lacks", f"Compared with {data}{held_out}. {about}"

@@ -4,28 +4,29 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from sea_ident.estimation import Model
 from sea_ident.report.chart import Chart, Line, Mark, Rule
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 from sea_ident.robot import Limits
 
 POINTS = 600
 
 
-class ExcitationSection(Section):
+class ExcitationSection(ModelSection):
     """Position, velocity and acceleration that were asked for, in their limits."""
 
     key: ClassVar[str] = "excitation"
     title: ClassVar[str] = "Excitation and its limits"
     needs: ClassVar[str] = "the excitation"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """Three charts per joint, and one per limited combination of joints."""
         excitation = content.excitation
         if excitation is None:
             return None
         series = excitation.series
-        robot = content.model.robot
+        robot = model.robot
         limits: Limits = robot.limits
         time = np.linspace(0.0, series.period, POINTS)
         values = [series.evaluate(time, derivative) for derivative in range(3)]

@@ -5,9 +5,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sea_ident.estimation import Verdict
+from sea_ident.estimation import Model, Verdict
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 from sea_ident.report.sections.parameters import POOR_PERCENT, parameter_rows
 
 NAMED = 8
@@ -26,22 +26,22 @@ class Finding:
     text: str
 
 
-class Findings(Section):
+class Findings(ModelSection):
     """Sentences that a person can act on, and the figures in large."""
 
     key: ClassVar[str] = "findings"
     title: ClassVar[str] = "Findings"
     needs: ClassVar[str] = "a model"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """Fit, parameters, springs and warnings."""
-        fit = content.model.fit
-        findings = [*_fit(content), *_parameters(content), *_springs(content), *_validations(content)]
-        findings.extend(Finding("warn", "Warning", text) for text in content.model.warnings)
+        fit = model.fit
+        findings = [*_fit(model), *_parameters(model), *_springs(model), *_validations(content)]
+        findings.extend(Finding("warn", "Warning", text) for text in model.warnings)
         share = fit.rms_residual / np.maximum(fit.rms_torque, 1e-300)
         tiles = [
             (f"{100 * float(share.max()):.2g} %", "largest residual, as a share of the torque"),
-            (str(content.model.base.rank), "base parameters"),
+            (str(model.base.rank), "base parameters"),
             (f"{fit.condition_number:.3g}", "condition number of F"),
             (f"{fit.log_det:.1f}", "log det F\N{PRIME}F"),
             (f"{fit.periods} \N{MULTIPLICATION SIGN} {fit.samples}", "periods and samples of each"),
@@ -49,8 +49,8 @@ class Findings(Section):
         return {"findings": findings, "tiles": tiles}
 
 
-def _fit(content: Content) -> list[Finding]:
-    model, fit = content.model, content.model.fit
+def _fit(model: Model) -> list[Finding]:
+    fit = model.fit
     found = []
     for i, joint in enumerate(model.robot.joints):
         rms, noise, torque = float(fit.rms_residual[i]), float(fit.noise_std[i]), float(fit.rms_torque[i])
@@ -72,8 +72,8 @@ def _fit(content: Content) -> list[Finding]:
     return found
 
 
-def _parameters(content: Content) -> list[Finding]:
-    rows = parameter_rows(content)
+def _parameters(model: Model) -> list[Finding]:
+    rows = parameter_rows(model)
     poor = [row for row in rows if row.poor]
     off = [row for row in rows if row.off]
     known = [row for row in rows if row.stated is not None]
@@ -112,7 +112,7 @@ def _parameters(content: Content) -> list[Finding]:
     return found
 
 
-def _springs(content: Content) -> list[Finding]:
+def _springs(model: Model) -> list[Finding]:
     levels = {Verdict.LINEAR: "good", Verdict.STIFFENING: "good"}
     return [
         Finding(
@@ -120,7 +120,7 @@ def _springs(content: Content) -> list[Finding]:
             f"{spring.joint} spring",
             f"{str(spring.verdict).replace('_', ' ')}: {spring.note}.",
         )
-        for spring in content.model.springs
+        for spring in model.springs
     ]
 
 

@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 from markupsafe import Markup
 
+from sea_ident.estimation import Model
 from sea_ident.regressor import prior_parameters
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 
 POOR_PERCENT = 20.0
 
@@ -75,9 +76,8 @@ class Row:
         )
 
 
-def parameter_rows(content: Content) -> list[Row]:
+def parameter_rows(model: Model) -> list[Row]:
     """All base parameters of the model, in its order."""
-    model = content.model
     base = model.base
     stated = base.project(prior_parameters(model.robot, model.effects))
     lower, upper = model.interval()
@@ -101,13 +101,13 @@ def parameter_rows(content: Content) -> list[Row]:
     return rows
 
 
-class Parameters(Section):
+class Parameters(ModelSection):
     """Table of the base parameters with intervals."""
 
     key: ClassVar[str] = "parameters"
     title: ClassVar[str] = "Parameters"
     needs: ClassVar[str] = "a model"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """The rows, and how sure they are."""
-        return {"rows": parameter_rows(content), "kind": str(content.model.covariance_kind)}
+        return {"rows": parameter_rows(model), "kind": str(model.covariance_kind)}

@@ -5,30 +5,31 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.estimation import Model
 from sea_ident.report.chart import Band, Chart, Line, Points, Rule
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 
 BINS = 24
 FEWEST_IN_BIN = 5
 DOTS = 700
 
 
-class Residuals(Section):
+class Residuals(ModelSection):
     """Per joint the residual over velocity, position, load and time: dots, and the mean of each bin."""
 
     key: ClassVar[str] = "residuals"
     title: ClassVar[str] = "Residual against velocity, position, load and time"
     needs: ClassVar[str] = "the data behind the model"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """Four charts per joint."""
-        excerpt = content.model.excerpt
+        excerpt = model.excerpt
         if not len(excerpt.motion):
             return None
         motion, predicted = excerpt.motion, excerpt.tau_model
         rows = []
-        for i, joint in enumerate(content.model.robot.joints):
+        for i, joint in enumerate(model.robot.joints):
             residual = excerpt.tau_motor[:, i] - predicted[:, i]
             position, torque = joint.position_unit, joint.torque_unit
             against = (

@@ -6,27 +6,28 @@ from typing import Any, ClassVar
 import numpy as np
 from markupsafe import Markup
 
+from sea_ident.estimation import Model
 from sea_ident.motion import FourierSeries
 from sea_ident.report.content import Content
 from sea_ident.report.scene import build_scene
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 from sea_ident.robot import Robot
 
 SWEEP_SECONDS = 6.0
 SWEEP_HALF_RANGE = 0.7
 
 
-class RobotMotion(Section):
+class RobotMotion(ModelSection):
     """A viewer that turns by dragging; the motion is that of the recording, of the excitation, or a sweep."""
 
     key: ClassVar[str] = "robot_motion"
     title: ClassVar[str] = "The robot along its trajectory"
     needs: ClassVar[str] = "a robot with moving bodies"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """The scene as JSON, and what moves it."""
-        robot = content.model.robot
-        motion, periodic = content.model.excerpt.motion, content.model.fit.period is not None
+        robot = model.robot
+        motion, periodic = model.excerpt.motion, model.fit.period is not None
         if len(motion) > 1:
             what = "The measured motion of the links" + (", averaged over the periods." if periodic else ".")
         elif content.excitation is not None:

@@ -5,27 +5,26 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.estimation import SpringResult, Verdict
+from sea_ident.estimation import Model, SpringResult, Verdict
 from sea_ident.estimation.uncertainty import student_factor
 from sea_ident.report.chart import Band, Chart, Line, Mark, Points
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 
 POINTS = 121
 LEVEL = 0.95
 GOOD = (Verdict.LINEAR, Verdict.STIFFENING)
 
 
-class Springs(Section):
+class Springs(ModelSection):
     """Per elastic joint the torque over the deflection, with the 95 % band of the curve."""
 
     key: ClassVar[str] = "springs"
     title: ClassVar[str] = "Springs"
     needs: ClassVar[str] = "an elastic joint"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """A chart per spring and a table of all."""
-        model = content.model
         if not model.springs:
             return None
         charts: list[Chart] = []

@@ -4,21 +4,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from sea_ident.estimation import Model
 from sea_ident.report.chart import Band, Chart, Line
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 
 
-class Torque(Section):
+class Torque(ModelSection):
     """Per joint the torque of the model over the measured one, and the residual against its noise."""
 
     key: ClassVar[str] = "torque"
     title: ClassVar[str] = "Motor torque"
     needs: ClassVar[str] = "the data behind the model"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """Two charts per joint, their times linked."""
-        model, excerpt = content.model, content.model.excerpt
+        excerpt = model.excerpt
         if not len(excerpt.motion):
             return None
         time = excerpt.motion.time - excerpt.motion.time[0]

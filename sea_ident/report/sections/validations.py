@@ -4,23 +4,24 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from sea_ident.estimation import Model
 from sea_ident.report.chart import Chart, Line
 from sea_ident.report.content import Content
-from sea_ident.report.section import Section
+from sea_ident.report.section import ModelSection
 
 
-class Validations(Section):
+class Validations(ModelSection):
     """Measured and predicted torque of other motions."""
 
     key: ClassVar[str] = "validations"
     title: ClassVar[str] = "Motions that were not used in the fit"
     needs: ClassVar[str] = "a recording to predict"
 
-    def context(self, content: Content) -> dict[str, Any] | None:
+    def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """One chart per joint and recording, with the numbers."""
         if not content.validations:
             return None
-        joints = content.model.robot.joints
+        joints = model.robot.joints
         groups = []
         for number, validation in enumerate(content.validations):
             time = validation.processed.motion.time - validation.processed.motion.time[0]

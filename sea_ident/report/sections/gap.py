@@ -1,0 +1,68 @@
+"""The gap between model and data, before and after the repair."""
+
+from typing import Any, ClassVar
+
+from sea_ident.discrepancy.diagnosis import Diagnosis, Gap
+from sea_ident.report.bars import bars, bars_legend
+from sea_ident.report.chart import Band, Chart, Line
+from sea_ident.report.section import DiagnosisSection
+
+ROLES = ("before", "after", "noise")
+NAMES = ("as it was", "with the effects", "noise")
+UNITS = {"q": "rad or m", "theta": "rad or m", "tau": "N m or N"}
+
+
+class GapSection(DiagnosisSection):
+    """Bars per joint, and the residuals over a period."""
+
+    key: ClassVar[str] = "gap"
+    title: ClassVar[str] = "The gap, before and after"
+    needs: ClassVar[str] = "a diagnosis"
+
+    def of_diagnosis(self, diagnosis: Diagnosis) -> dict[str, Any] | None:
+        """Bars of every gap that was measured, and waveforms."""
+        groups = []
+        for label, gap in (
+            ("the recording that was diagnosed", diagnosis.training),
+            ("data that were held out", diagnosis.holdout),
+        ):
+            if gap is not None:
+                groups.append((_bars(gap, f"On {label}", "N m or N"), 100.0 * gap.shrink))
+        for signal, gap in diagnosis.simulation_gap.items():
+            groups.append((_bars(gap, f"Forward simulation, {signal}", UNITS.get(signal, "")), 100.0 * gap.shrink))
+        if not groups:
+            return None
+        return {
+            "groups": groups,
+            "legend": bars_legend(NAMES, ROLES),
+            "waves": _waves(diagnosis),
+        }
+
+
+def _bars(gap: Gap, title: str, unit: str) -> Any:
+    joints = list(gap.before)
+    series = {
+        name: [part[joint] for joint in joints]
+        for name, part in zip(NAMES, (gap.before, gap.after, gap.noise), strict=True)
+    }
+    return bars(joints, series, ROLES, title, unit)
+
+
+def _waves(diagnosis: Diagnosis) -> list[Any]:
+    waves = diagnosis.waveforms
+    if waves is None:
+        return []
+    time = waves.time - waves.time[0]
+    found = []
+    for e, name in enumerate(waves.equations):
+        band = 2.0 * float(waves.noise[e])
+        chart = Chart(
+            [
+                Band(time, 0.0 * time - band, 0.0 * time + band, "reference", "\N{PLUS-MINUS SIGN}2 std of the noise"),
+                Line(time, waves.before[:, e], "before", "residual as it was"),
+                Line(time, waves.after[:, e], "after", "residual with the effects"),
+            ],
+            "time [s]", "residual [N m]", f"{name} equation", height=150, link="diagnosis",
+        )  # fmt: skip
+        found.append({"svg": chart.svg(), "legend": chart.legend()})
+    return found

@@ -1,0 +1,52 @@
+"""The outcome of a diagnosis in a sentence."""
+
+from typing import Any, ClassVar
+
+from sea_ident.discrepancy.diagnosis import Diagnosis, Verdict
+from sea_ident.report.section import DiagnosisSection
+
+MEANING = {
+    Verdict.NONE: ("good", "nothing is missing"),
+    Verdict.NAMED: ("warn", "the missing effects are named"),
+    Verdict.NAMED_WITH_REMAINDER: ("warn", "the missing effects are named, and something small is left"),
+    Verdict.AMBIGUOUS: ("warn", "something is missing that these data cannot tell from something else"),
+    Verdict.SUSPECT: ("bad", "a name was found that does not hold on other data"),
+    Verdict.NOT_IN_LIBRARY: ("bad", "something is missing that no known effect explains"),
+    Verdict.ONLY_AGAINST_REFERENCE: ("warn", "the difference shows against an earlier model only"),
+    Verdict.CANNOT_TELL: ("bad", "these data do not allow a verdict"),
+}
+CLEAR, POSSIBLE = 1e-3, 0.05
+
+
+class VerdictSection(DiagnosisSection):
+    """Verdict, lack of fit per joint and equation, warnings."""
+
+    key: ClassVar[str] = "verdict"
+    title: ClassVar[str] = "Verdict"
+    needs: ClassVar[str] = "a diagnosis"
+
+    def of_diagnosis(self, diagnosis: Diagnosis) -> dict[str, Any] | None:
+        """Sentence, tiles and table."""
+        level, meaning = MEANING[diagnosis.verdict]
+        lack = diagnosis.lack_of_fit
+        tiles = [(str(len(diagnosis.missing)), "effects missing")]
+        for label, gap in (("the recording", diagnosis.training), ("held-out data", diagnosis.holdout)):
+            if gap is not None:
+                tiles.append((f"{100 * gap.shrink:.0f} %", f"of the gap closed on {label}"))
+        equations = list(dict.fromkeys(name for parts in lack.per_joint.values() for name in parts))
+        return {
+            "level": level,
+            "meaning": meaning,
+            "word": str(diagnosis.verdict).replace("_", " "),
+            "text": diagnosis.text,
+            "tiles": tiles,
+            "lack": lack,
+            "equations": equations,
+            "fit_level": _level(lack.p_value),
+            "trend_level": _level(lack.trend_p_value),
+            "warnings": diagnosis.warnings,
+        }
+
+
+def _level(p_value: float) -> str:
+    return "bad" if p_value < CLEAR else "warn" if p_value < POSSIBLE else "good"

@@ -1,0 +1,172 @@
+"""The report of a diagnosis: what it says is what the diagnosis says."""
+
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.diagnosis import (
+    Alternative,
+    Detectability,
+    Diagnosis,
+    Gap,
+    LackOfFit,
+    Location,
+    MissingEffect,
+    MissingParameter,
+    NextExperiment,
+    Verdict,
+    Waveforms,
+    read_diagnosis,
+)
+from sea_ident.report import write_report
+from sea_ident.report.bars import bars
+from sea_ident.report.sections.missing import curve
+from sea_ident.report.sections.verdict import MEANING
+
+JOINTS = ("hip", "knee", "ankle")
+EQUATIONS = tuple(f"{joint} {kind}" for joint in JOINTS for kind in ("motor", "link"))
+SPEED = 0.3
+
+
+def waveforms() -> Waveforms:
+    """A residual that holds a Stribeck friction of the knee's motor, and noise."""
+    rng = np.random.default_rng(0)
+    time = np.arange(400) * 0.025
+    q = np.stack([np.sin(2 * np.pi * (k + 1) * time / 10.0 + k) for k in range(3)], axis=1)
+    dtheta = np.gradient(q, time, axis=0)
+    torque = np.zeros((400, 6))
+    torque[:, 2] = 0.6 * np.sign(dtheta[:, 1]) * np.exp(-((dtheta[:, 1] / SPEED) ** 2))
+    after = 0.02 * rng.normal(size=(400, 6))
+    return Waveforms(
+        time,
+        EQUATIONS,
+        after + torque,
+        after,
+        np.full(6, 0.02),
+        q,
+        dtheta,
+        0.01 * q,
+        {"stribeck_friction at knee": torque},
+    )
+
+
+@pytest.fixture
+def diagnosis() -> Diagnosis:
+    return Diagnosis(
+        verdict=Verdict.NAMED,
+        text="The motor of the knee has more friction near standstill than the model: add Stribeck friction.",
+        lack_of_fit=LackOfFit(
+            1234.5, 400, 1e-12, 0.4, {j: {"motor": 3.1 if j == "knee" else 1.02, "link": 0.98} for j in JOINTS}, 0.001
+        ),
+        locations=(
+            Location("knee", "motor", "near reversal", 0.41, 88.0),
+            Location("knee", "motor", "slow", 0.3, 41.0),
+            Location("hip", "link", "time 0 to 1.25 s", 0.02, 6.2),
+        ),
+        missing=(
+            MissingEffect(
+                "stribeck_friction", "knee",
+                (
+                    MissingParameter("knee.stribeck_friction", 0.6, 0.02, "N m"),
+                    MissingParameter("knee.stribeck_friction_speed", SPEED, 0.01, "rad/s"),
+                ),
+                0.037, 2e-11, (Alternative("nonlinear_viscous_friction", "knee", 0.93),), 0.97,
+            ),
+        ),
+        training=Gap({"hip": 0.02, "knee": 0.4, "ankle": 0.01}, {"hip": 0.02, "knee": 0.03, "ankle": 0.01},
+                     {"hip": 0.05, "knee": 0.05, "ankle": 0.04}),
+        holdout=Gap({"hip": 0.0, "knee": 0.3, "ankle": 0.0}, {"hip": 0.0, "knee": 0.06, "ankle": 0.0},
+                    {"hip": 0.05, "knee": 0.05, "ankle": 0.04}),
+        simulation_gap={"q": Gap(*(dict.fromkeys(JOINTS, size) for size in (0.01, 0.001, 1e-5)))},
+        detectability=(
+            Detectability("backlash", "hip", 0.002, "rad", 0.3, ("spring_offset at hip", "asymmetric_spring")),
+            Detectability("base_tilt", None, float("inf"), "rad", 1.0, ("encoder_offset",)),
+        ),
+        next_experiment=NextExperiment(("stribeck_friction at knee", "nonlinear_viscous_friction at knee"), {}, 2.6),
+        warnings=("only 12 periods",),
+        waveforms=waveforms(),
+        recording="rec.csv",
+        holdout_source="rec2.csv",
+    )  # fmt: skip
+
+
+def page_of(diagnosis: Diagnosis, folder) -> str:
+    write_report(diagnosis, folder / "d.html")
+    return (folder / "d.html").read_text(encoding="utf-8")
+
+
+def words(page: str) -> str:
+    return " ".join(re.sub(r"<[^>]*>", " ", page[page.index("<main>") : page.index("</main>")]).split())
+
+
+def test_the_page_says_verdict_gap_effect_and_alternatives(diagnosis, tmp_path):
+    text = words(page_of(diagnosis, tmp_path))
+    assert diagnosis.text in text
+    assert "only 12 periods" in text
+    assert "stribeck friction at the knee" in text
+    assert "knee.stribeck_friction_speed 0.3 0.01 rad/s" in text
+    assert "carries 3.7 % of the torque" in text
+    assert "explain 97 %" in text
+    assert "nonlinear_viscous_friction at knee (overlap 0.93)" in text
+    # held out: 1 - 0.06 / 0.3
+    assert "80 % of the gap closed on held-out data" in text
+    assert "2.6 times better" in text
+    assert "backlash hip 0.002 rad 30 spring_offset at hip, asymmetric_spring" in text
+    assert "0.1 % of the torque: an unmodelled remainder" in text
+
+
+def test_a_diagnosis_read_from_its_file_gives_the_same_page(diagnosis, tmp_path):
+    diagnosis.save(tmp_path / "d.json")
+    again = read_diagnosis(tmp_path / "d.json")
+    assert words(page_of(again, tmp_path)) == words(page_of(diagnosis, tmp_path))
+
+
+def test_with_the_repaired_model_its_sections_follow(diagnosis, leg_model, tmp_path):
+    page = page_of(replace(diagnosis, model=leg_model), tmp_path)
+    order = re.findall(r'<section id="(\w+)"', page)
+    assert order[:5] == ["verdict", "gap", "missing", "locations", "detectability"]
+    assert {"parameters", "robot_motion", "torque"} <= set(order)
+    assert "exo_leg: what the model lacks" in page
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_every_verdict_has_a_page_even_with_nothing_else(verdict, tmp_path):
+    bare = Diagnosis(verdict, "A sentence.", LackOfFit(0.0, 1, 1.0, 1.0, {}))
+    page = page_of(bare, tmp_path)
+    assert MEANING[verdict][1][1:] in page
+    assert "A sentence." in page
+    assert re.findall(r'<section id="(\w+)"', page) == ["verdict"]
+
+
+def test_the_curve_of_friction_is_drawn_over_velocity(diagnosis):
+    chart = curve(diagnosis.missing[0], diagnosis.waveforms)
+    assert chart.x_label == "motor velocity of the knee [rad/s]"
+    line = chart.marks[1]
+    expected = 0.6 * np.sign(line.x) * np.exp(-((line.x / SPEED) ** 2))
+    away = np.abs(line.x) > 0.05
+    np.testing.assert_allclose(line.y[away], expected[away], atol=0.03)
+    # the dots are what the final model leaves plus the effect
+    np.testing.assert_allclose(chart.marks[0].y, diagnosis.waveforms.before[:, 2])
+
+
+def test_an_effect_that_follows_no_state_is_drawn_over_time(diagnosis):
+    waves = diagnosis.waveforms
+    pulse = np.zeros((400, 6))
+    pulse[150:180, 1] = 1.0
+    pushed = replace(waves, explained={"external_force at hip": pulse})
+    effect = MissingEffect("external_force", "hip", (), 0.1, 1e-9, ())
+    assert curve(effect, pushed).x_label == "time [s]"
+
+
+def test_bars_are_as_high_as_their_values():
+    svg = bars(["a", "b"], {"before": [4.0, 2.0], "after": [1.0, 0.0]}, ["before", "after"], "t", "N m")
+    root = ElementTree.fromstring(svg)
+    rectangles = [e for e in root.iter("rect")]
+    heights = [float(e.attrib["height"]) for e in rectangles]
+    assert heights[1] == pytest.approx(heights[0] / 4, abs=0.1)
+    assert heights[2] == pytest.approx(heights[0] / 2, abs=0.1)
+    assert json.dumps([e.find("title").text for e in rectangles]).count("N m") == 4
