@@ -1,10 +1,15 @@
 """What verbs read."""
 
+import json
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from sea_ident.discrepancy import Diagnosis
     from sea_ident.effects import Effect
+    from sea_ident.estimation import Model
     from sea_ident.robot import Robot
 
 
@@ -41,3 +46,26 @@ def read_effects(robot: "Robot", added: Sequence[str] | None) -> "tuple[Effect, 
             raise EffectError(f"the effect {name!r} does not fit {where} of {robot.name}")
         effects.extend(found)
     return tuple(effects)
+
+
+def read_result(path: Path, model: Path | None) -> "Model | Diagnosis":
+    """A model or a diagnosis, whichever the file holds, the latter with its repaired model if that is given.
+
+    Raises:
+        ModelFileError: the file cannot be read, or holds neither.
+        SeaIdentError: a model is given for a model.
+    """
+    from sea_ident.discrepancy import read_diagnosis
+    from sea_ident.estimation import read_model
+    from sea_ident.exceptions import ModelFileError, SeaIdentError
+
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ModelFileError(f"{path}: cannot be read as a model or a diagnosis: {error}") from None
+    if not isinstance(record, dict) or "verdict" not in record:
+        if model is not None:
+            raise SeaIdentError(f"{path}: is no diagnosis; --model goes with a diagnosis only")
+        return read_model(path)
+    diagnosis = read_diagnosis(path)
+    return diagnosis if model is None else replace(diagnosis, model=read_model(model))

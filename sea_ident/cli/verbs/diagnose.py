@@ -1,0 +1,63 @@
+"""`sea-ident diagnose`: where model and data disagree, and which effect is missing."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sea_ident.cli.options import AsJson, ModelFile, Period, RecordingFile, ReportFile
+from sea_ident.cli.output import check_targets, emit, note, progress
+
+STEPS = 100
+
+
+def diagnose(
+    model: ModelFile,
+    recording: RecordingFile,
+    out: Annotated[Path, typer.Option("--out", metavar="DIAGNOSIS.json", help="File to write.", show_default=False)],
+    holdout: Annotated[
+        Path | None, typer.Option("--holdout", metavar="REC2", help="Another motion, on which the finding must hold.")
+    ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option("--reference", metavar="MODEL0.json", help="Earlier model; shows what a refit absorbs."),
+    ] = None,
+    model_out: Annotated[
+        Path | None, typer.Option("--model-out", metavar="MODEL2.json", help="Write the repaired model.")
+    ] = None,
+    period: Period = None,
+    report: ReportFile = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find where a model and a recording disagree, name the missing effect and repair the model."""
+    from sea_ident.discrepancy import diagnose as run
+    from sea_ident.estimation import read_model
+    from sea_ident.recordings import read_recording
+
+    check_targets(out, model_out, report)
+    loaded, earlier = read_model(model), None if reference is None else read_model(reference)
+    measured, other = read_recording(recording), None if holdout is None else read_recording(holdout)
+    with progress("diagnosing", STEPS) as tell:
+        found = run(
+            loaded,
+            measured,
+            holdout=other,
+            reference=earlier,
+            period=period,
+            progress=lambda what, share: tell(round(STEPS * share), what),
+        )
+    found.save(out)
+    files = [str(out)]
+    if model_out is not None:
+        if found.model is None:
+            note(f"warning: {model_out} is not written: there is no repaired model with the verdict {found.verdict}")
+        else:
+            found.model.save(model_out)
+            files.append(str(model_out))
+    if report is not None:
+        from sea_ident.report import write_report
+
+        with progress("writing the report"):
+            write_report(found, report)
+        files.append(str(report))
+    emit({**found.to_dict(), "files": files}, f"{found.summary()}\nwritten: {', '.join(files)}", as_json=as_json)
