@@ -1,5 +1,6 @@
 """The regressor: effects in, labelled columns out."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -52,8 +53,7 @@ def model_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, ...]
         SeaIdentError: if two columns share a name.
     """
     columns = tuple(column for effect in effects for column in effect.columns(robot))
-    names = [column.name for column in columns]
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = sorted(name for name, count in Counter(column.name for column in columns).items() if count > 1)
     if twice:
         raise SeaIdentError(f"the effects give two columns the same name: {', '.join(twice)}; leave one out")
     return columns
@@ -89,8 +89,8 @@ def build_regressor(
     columns = model_columns(robot, effects)
     link, motor = np.zeros((2, len(motion), robot.n, len(columns)))
     for place, part in _parts(effects, state):
-        _add(link, place, part.link, part.joint, slice(None))
-        _add(motor, place, part.motor, part.joint, slice(None))
+        _put(link, place, part.link, part.joint, slice(None))
+        _put(motor, place, part.motor, part.joint, slice(None))
     rows = Contribution(link, motor)
     for effect in effects:
         rows = effect.shifted(robot, motion.time, rows)
@@ -129,8 +129,8 @@ def build_total(
             continue
         inside = kept[first:last] - place.start
         take: IntArray | slice = slice(None) if len(inside) == place.stop - place.start else inside
-        _add(total, slice(first, last), part.link, part.joint, take)
-        _add(total, slice(first, last), part.motor, part.joint, take)
+        _put(total, slice(first, last), part.link, part.joint, take)
+        _put(total, slice(first, last), part.motor, part.joint, take, _is_nothing(part.link))
     whole = Contribution(total, np.broadcast_to(0.0, total.shape))
     for effect in effects:
         whole = effect.shifted(robot, motion.time, whole)
@@ -147,14 +147,22 @@ def _parts(effects: Sequence[Effect], state: State) -> Iterator[tuple[slice, Con
         start = stop
 
 
-def _add(total: FloatArray, place: slice, rows: FloatArray, joint: int | None, take: IntArray | slice) -> None:
-    """Add rows to their columns, touching no more memory than they need."""
+def _put(
+    total: FloatArray,
+    place: slice,
+    rows: FloatArray,
+    joint: int | None,
+    take: IntArray | slice,
+    untouched: bool = True,
+) -> None:
+    """Put rows into their columns, or add them to what is there, touching no more memory than they need."""
     if _is_nothing(rows):
         return
-    if joint is None:
-        total[:, :, place] += rows[:, :, take]
+    where = slice(None) if joint is None else joint
+    if untouched:
+        total[:, where, place] = rows[:, where, take]
     else:
-        total[:, joint, place] += rows[:, joint, take]
+        total[:, where, place] += rows[:, where, take]
 
 
 def _is_nothing(rows: FloatArray) -> bool:

@@ -1,6 +1,7 @@
 """The robot: links and rotors as one Pinocchio model, exact in the plane and in 3-D."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -108,12 +109,12 @@ class Robot:
         """Number of joints."""
         return len(self.joints)
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in kinematic order."""
         return tuple(joint.name for joint in self.joints)
 
-    @property
+    @cached_property
     def elastic(self) -> tuple[bool, ...]:
         """(n,) whether each joint has a spring."""
         return tuple(joint.elastic for joint in self.joints)
@@ -154,7 +155,7 @@ class Robot:
 
     # -- parameters ------------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def inertial_names(self) -> tuple[str, ...]:
         """(10 b,) names of the standard inertial parameters, body by body in Pinocchio's order."""
         return tuple(f"{body}.{name}" for body in self.bodies for name in INERTIAL_NAMES)
@@ -166,7 +167,7 @@ class Robot:
         values = [inertias[int(i)].toDynamicParameters() for i in self.body_indices]
         return np.concatenate(values) if values else np.zeros(0)
 
-    @property
+    @cached_property
     def rotor_groups(self) -> tuple[str, ...]:
         """Names of the distinct rotor inertia parameters, `<joint or group>.rotor_inertia`."""
         return tuple(dict.fromkeys(f"{rotor.rotor_group}.rotor_inertia" for rotor in self.rotors))
