@@ -25,16 +25,5 @@ VERBS: tuple[Callable[..., None], ...] = (
     report,
     batch,
 )
-    demo,
-    inspect,
-    excite,
-    simulate,
-    identify,
-    validate,
-    diagnose,
-    export,
-    report,
-    batch,
-)
 
 __all__ = ["VERBS"]
