@@ -173,6 +173,7 @@ def _spiked_periods(data: PeriodData) -> set[int]:
         data.period_tau_motor,
         *(np.stack([getattr(m, k) for m in data.period_motions]) for k in ("ddq", "ddtheta")),
     ]
+    reversals = _reversals(data)
     for stack in stacks:
         middle = np.median(stack, axis=0)
         distance = np.abs(stack - middle)
@@ -180,9 +181,20 @@ def _spiked_periods(data: PeriodData) -> set[int]:
         # near a reversal the spread is what it is there; nowhere is it smaller than in general
         scale = np.maximum(usual, np.median(usual, axis=0))
         span = np.ptp(middle, axis=0)
-        far = (distance > SPIKE * scale) & (distance > 0.2 * span) & (scale > 0.0)
+        far = (distance > SPIKE * scale) & (distance > 0.2 * span) & (scale > 0.0) & ~reversals
         out |= {int(p) for p in np.flatnonzero(far.any(axis=(1, 2)))}
     return out
+
+
+def _reversals(data: PeriodData) -> NDArray[np.bool_]:
+    """(N, n) samples at which, in some period, a motor turns back within two samples.
+
+    There friction and the efficiency of the transmission (paper, eq. 7) change sides: a sample in which one period has
+    already turned and the others have not is no spike, nor is the jerk of a motor that comes loose.
+    """
+    forward = np.stack([motion.dtheta > 0.0 for motion in data.period_motions])
+    near = np.concatenate([np.roll(forward, shift, axis=1) for shift in range(-2, 3)])
+    return np.asarray(near.any(axis=0) & ~near.all(axis=0), dtype=np.bool_)
 
 
 def _subset(data: PeriodData, keep: list[int]) -> PeriodData:
