@@ -107,9 +107,30 @@ def test_any_choice_of_joints(silent: None, joints: list[str]) -> None:
     read(LEG_BARE, tuple(joints))
 
 
-def edited(changes: list[tuple[tuple[int, int], str]]) -> str:
-    text, last = LEG_BARE, len(LEG_BARE) + 1
+def edited(changes: list[tuple[tuple[int, int], str]], text: str = LEG_BARE) -> str:
+    last = len(text) + 1
     for (start, end), value in sorted(changes, reverse=True):
         if end <= last:
             text, last = text[:start] + value + text[end:], start
     return text
+
+
+TRANSMISSIONS = "".join(re.findall(r"<transmission.*?</transmission>", LEG_BARE, flags=re.DOTALL))
+FRAGMENT = f'<robot name="leg">{TRANSMISSIONS}</robot>'
+BARE = re.sub(r"<transmission.*?</transmission>", "", LEG_BARE, flags=re.DOTALL)
+WORDS = [m.span() for m in re.finditer(r"[A-Za-z_/0-9.+-]+", FRAGMENT)]
+
+
+@BUDGET
+@given(st.lists(st.tuples(st.sampled_from(WORDS), st.sampled_from([*BAD_NUMBERS, *BAD_NAMES])), max_size=3))
+def test_any_word_of_an_annotation_replaced(silent: None, changes: list[tuple[tuple[int, int], str]]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        try:
+            robot = robot_from_text(BARE, "fuzz.urdf", edited(changes, FRAGMENT))
+        except SeaIdentError as error:
+            message = str(error)
+        else:
+            message = "fuzz.urdf"
+            assert np.all(np.isfinite(robot.motor_inertia(np.zeros(robot.n))))
+    assert message.startswith(("fuzz.urdf", "annotation"))
