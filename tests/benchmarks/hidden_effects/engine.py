@@ -245,12 +245,12 @@ def simulate_mujoco(
                 f = h.bristle(s, level)
             elif level > 0.0:
                 ahead = v[it[i]] / gear[i] + step * (free / m - coupling[i]) + carried
-                f = ahead / (smoothing / level + step / m)
+                f = ahead / ((0.0 if h.sticks else smoothing) / level + step / m)
                 if f > level:
                     f = level
                 elif f < -level:
                     f = -level
-                if not ramp:
+                if not (ramp or h.sticks):
                     w = ahead - step * f / m
                     for _ in range(4):
                         bend = tanh(w / smoothing)

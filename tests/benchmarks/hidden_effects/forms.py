@@ -43,6 +43,7 @@ class Hooks:
         drive: torque that the drive delivers for the torque that is recorded.
         viscous: factor of the viscous friction over time.
         temperature: of the motor over time [degC].
+        sticks: whether the Coulomb friction really holds at zero speed, without any smoothing.
         turned: joint j and ratio r where the motor turns with theta + r q_j.
     """
 
@@ -56,6 +57,7 @@ class Hooks:
     viscous: Change | None = None
     temperature: Callable[[float], float] | None = None
     turned: tuple[int, float] | None = None
+    sticks: bool = False
 
 
 def trend(kind: float, duration: float) -> Callable[[float], float]:
@@ -107,6 +109,11 @@ ELSEWHERE = {
 def _stribeck(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
     c, vs, a = p.size, p.shape["speed"], p.shape["exponent"]
     hooks[i].level.append(lambda s, f: f + c * exp(-((abs(s.dth) / vs) ** a)))
+
+
+def _stiction(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
+    hooks[i].sticks = True
+    _stribeck(p, truth, i, hooks, wide, step, duration)
 
 
 def _stribeck_lorentz(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
@@ -366,7 +373,7 @@ def _cross_viscous(p, truth, i, hooks, wide, step, duration):  # type: ignore[no
 
 _FORMS = {
     ("stribeck_friction", "library"): _stribeck,
-    ("stribeck_friction", "stiction"): _stribeck,
+    ("stribeck_friction", "stiction"): _stiction,
     ("stribeck_friction", "lorentz"): _stribeck_lorentz,
     ("nonlinear_viscous_friction", "library"): _power,
     ("nonlinear_viscous_friction", "exponent"): _power,
