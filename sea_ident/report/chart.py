@@ -111,7 +111,7 @@ class Chart:
             x = x_of(tick)
             out.append(f'<line x1="{x:.1f}" y1="{top}" x2="{x:.1f}" y2="{top + inner_height}"/>')
             out.append(f'<text class="tx" x="{x:.1f}" y="{top + inner_height + 14}">{tick_text(tick)}</text>')
-        for tick in nice_ticks(y0, y1, max(3, inner_height // 36)):
+        for tick in nice_ticks(y0, y1, max(4, inner_height // 32)):
             y = y_of(tick)
             out.append(f'<line x1="{left}" y1="{y:.1f}" x2="{left + inner_width}" y2="{y:.1f}"/>')
             out.append(f'<text class="ty" x="{left - 6}" y="{y + 3.5:.1f}">{tick_text(tick)}</text>')
@@ -232,7 +232,7 @@ def nice_ticks(low: float, high: float, most: int) -> list[float]:
     """At most about `most` round numbers between two values."""
     step = (high - low) / max(most, 1)
     power = 10.0 ** math.floor(math.log10(step))
-    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= step * 0.999)
+    step = next(factor * power for factor in (1.0, 2.0, 2.5, 5.0, 10.0) if factor * power >= step * 0.999)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
 

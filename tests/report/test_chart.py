@@ -57,7 +57,7 @@ def test_ticks_are_round_inside_and_few(low, high, most):
     assert all(low - 1e-9 * (high - low) <= t <= high + 1e-9 * (high - low) for t in ticks)
     step = np.diff(ticks)[0] if len(ticks) > 1 else ticks[0]
     mantissa = step / 10.0 ** np.floor(np.log10(abs(step)))
-    assert min(abs(mantissa - round_one) for round_one in (1.0, 2.0, 5.0, 10.0)) < 1e-6
+    assert min(abs(mantissa - round_one) for round_one in (1.0, 2.0, 2.5, 5.0, 10.0)) < 1e-6
 
 
 def test_labels_are_escaped_and_the_legend_names_every_mark_once():

@@ -9,7 +9,9 @@ from sea_ident.discrepancy.diagnosis import Diagnosis, MissingEffect, Waveforms
 from sea_ident.report.chart import Chart, Line, Points
 from sea_ident.report.section import DiagnosisSection
 
-BINS = 24
+NEIGHBOURS = 5
+"""Samples that make up a point of a curve."""
+
 DOTS = 700
 
 
@@ -55,11 +57,12 @@ def curve(effect: MissingEffect, waves: Waveforms) -> Chart | None:
     left = waves.after[:, e] + torque
     step = max(1, len(torque) // DOTS)
     order = np.argsort(axis, kind="stable")
-    ties_in_time = label.startswith("time")
-    line = Line(axis[order], torque[order], "after", "the effect") if ties_in_time else _binned(axis, torque)
+    line = (
+        Line(axis[order], torque[order], "after", "the effect") if label.startswith("time") else _smoothed(axis, torque)
+    )
     return Chart(
         [Points(axis[::step], left[::step], "before", "residual left to it"), line],
-        label, f"torque [N m], {waves.equations[e]}", width=620, height=240,
+        label, f"torque [N m], {waves.equations[e]}", width=900, height=260,
     )  # fmt: skip
 
 
@@ -71,7 +74,7 @@ def _explained(effect: MissingEffect, waves: Waveforms) -> FloatArray | None:
 
 
 def _abscissa(effect: MissingEffect, waves: Waveforms, equation: int, torque: FloatArray) -> tuple[FloatArray, str]:
-    """Of velocity, position and deflection of its joint and of time, the one whose bins explain the torque best."""
+    """Of velocity, position and deflection of its joint and of time, the one that the torque is a function of."""
     joints = list(dict.fromkeys(name.rpartition(" ")[0] for name in waves.equations))
     joint = effect.joint if effect.joint in joints else waves.equations[equation].rpartition(" ")[0]
     i = min(joints.index(joint), waves.q.shape[1] - 1)
@@ -80,26 +83,22 @@ def _abscissa(effect: MissingEffect, waves: Waveforms, equation: int, torque: Fl
         (waves.deflection[:, i], f"deflection of the {joint} [rad]"),
         (waves.q[:, i], f"position of the {joint} [rad]"),
     ]
-    scores = [_share_by_bins(x, torque) for x, _ in candidates]
+    scores = [_share_explained(x, torque) for x, _ in candidates]
     best = int(np.argmax(scores))
     return candidates[best] if scores[best] > 0.5 else (waves.time - waves.time[0], "time [s]")
 
 
-def _share_by_bins(x: FloatArray, values: FloatArray) -> float:
-    """Share of the variance of values (N,) that their means over bins of x (N,) explain."""
+def _share_explained(x: FloatArray, values: FloatArray) -> float:
+    """How far values (N,) are a function of x (N,): 1 less the jumps between neighbours in x over their variance."""
     if np.ptp(x) == 0.0 or np.var(values) == 0.0:
         return 0.0
-    place = np.clip(((x - x.min()) / np.ptp(x) * BINS).astype(int), 0, BINS - 1)
-    count = np.maximum(np.bincount(place, minlength=BINS), 1)
-    mean = np.bincount(place, values, minlength=BINS) / count
-    return float(1.0 - np.mean((values - mean[place]) ** 2) / np.var(values))
+    jumps = np.diff(values[np.argsort(x, kind="stable")])
+    return float(1.0 - np.mean(jumps**2) / (2.0 * np.var(values)))
 
 
-def _binned(x: FloatArray, values: FloatArray) -> Line:
-    edges = np.linspace(x.min(), x.max(), 4 * BINS + 1)
-    place = np.clip(np.digitize(x, edges) - 1, 0, 4 * BINS - 1)
-    count = np.bincount(place, minlength=4 * BINS)
-    filled = count > 0
-    mean = np.bincount(place, values, minlength=4 * BINS)[filled] / count[filled]
-    centre = ((edges[:-1] + edges[1:]) / 2.0)[filled]
-    return Line(centre, mean, "after", "the effect")
+def _smoothed(x: FloatArray, values: FloatArray) -> Line:
+    """Means of groups of neighbours in x: as fine as there are samples, however steep the curve."""
+    order = np.argsort(x, kind="stable")
+    groups = np.array_split(order, max(1, len(x) // NEIGHBOURS))
+    centre = np.array([x[group].mean() for group in groups])
+    return Line(centre, np.array([values[group].mean() for group in groups]), "after", "the effect")

@@ -8,7 +8,7 @@
   function niceTicks(low, high, most) {
     let step = (high - low) / Math.max(most, 1);
     const power = Math.pow(10, Math.floor(Math.log10(step)));
-    step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= step * 0.999);
+    step = [1, 2, 2.5, 5, 10].map((f) => f * power).find((s) => s >= step * 0.999);
     const ticks = [];
     for (let k = Math.ceil(low / step - 1e-9); k <= Math.floor(high / step + 1e-9); k++) ticks.push(k * step);
     return ticks;
@@ -110,7 +110,7 @@
         element(this.ticks, "line", { x1: x, x2: x, y1: this.top, y2: this.top + this.height });
         element(this.ticks, "text", { class: "tx", x, y: this.top + this.height + 14 }, tickText(t));
       }
-      for (const t of niceTicks(low, high, Math.max(3, Math.floor(this.height / 36)))) {
+      for (const t of niceTicks(low, high, Math.max(4, Math.floor(this.height / 32)))) {
         const y = this.top + ((high - t) / (high - low)) * this.height;
         element(this.ticks, "line", { x1: this.left, x2: this.left + this.width, y1: y, y2: y });
         element(this.ticks, "text", { class: "ty", x: this.left - 6, y: y + 3.5 }, tickText(t));
