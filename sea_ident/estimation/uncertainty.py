@@ -121,6 +121,8 @@ def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArra
     interval can say of a model error that nobody has named.
     """
     mean = observations.residual(estimate.values)
+    if estimate.period_torque is not None:
+        mean = mean + estimate.period_torque.mean(axis=0) - observations.torque
     periods = len(residuals)
     noise = (residuals**2).sum(axis=0) / (periods * (periods - 1.0))
     noise_energy, energy = (estimate.weights * noise).sum(axis=0), (estimate.weights * mean**2).sum(axis=0)

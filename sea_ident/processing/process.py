@@ -97,6 +97,46 @@ def filter_recording(recording: Recording, robot: Robot, *, cutoff: float | None
     return result
 
 
+def from_states(
+    robot: Robot, motion: Motion, tau_motor: FloatArray, source: str = "exact states"
+) -> ProcessedRecording:
+    """States that are known with their derivatives, as from a simulation, in the form that identification takes.
+
+    Args:
+        robot: the robot.
+        motion: (N, n) motion.
+        tau_motor: (N, n) motor torque at the joint side [N m] or [N].
+        source: where they come from, for messages.
+
+    Returns:
+        One stretch; nothing is filtered or averaged.
+
+    Raises:
+        RecordingError: the sizes do not fit the robot.
+    """
+    if motion.n != robot.n or tau_motor.shape != motion.q.shape:
+        raise RecordingError(
+            f"{source}: motion of {motion.n} joints and torque of shape {tau_motor.shape} for {robot.name}, which has "
+            f"{robot.n} joints"
+        )
+    spread = np.broadcast_to(variance.noise_from_curvature(tau_motor), tau_motor.shape)
+    return ProcessedRecording(
+        source=source,
+        joint_names=robot.joint_names,
+        motion=motion,
+        tau_motor=tau_motor,
+        tau_variance=spread,
+        raw_tau_variance=spread,
+        periods=1,
+        period=None,
+        period_motions=(),
+        period_tau_motor=tau_motor[None],
+        channels={},
+        link_harmonics=0,
+        motor_harmonics=0,
+    )
+
+
 def _signals(recording: Recording, robot: Robot) -> _Signals:
     names = robot.joint_names
     q = recording.channel("q", names)

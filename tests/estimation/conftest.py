@@ -16,3 +16,9 @@ def leg() -> Robot:
 @pytest.fixture(scope="session")
 def truth(leg: Robot) -> Truth:
     return truth_of(leg, leg_series())
+
+
+@pytest.fixture(scope="session")
+def coarse(leg: Robot) -> Truth:
+    """The same motion with fewer samples, for tests that need many recordings."""
+    return truth_of(leg, leg_series(), samples=500)

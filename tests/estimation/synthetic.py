@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from sea_ident.effects import base_effects
 from sea_ident.motion import FourierSeries, Motion
@@ -59,8 +60,12 @@ def record(
     torque_noise: float = 0.0,
     reversal_noise: float = 0.0,
     encoder_noise: float = 0.0,
+    correlation: float = 0.0,
 ) -> Recording:
-    """What sensors see of P periods: white noise on angles and torque, more of it near velocity reversals."""
+    """What sensors see of P periods: noise on angles and torque, more of it near velocity reversals.
+
+    The torque noise has the one-step correlation given; all else is white.
+    """
     rng = np.random.default_rng(seed)
     samples = len(truth.motion)
     step = truth.motion.time[1] - truth.motion.time[0]
@@ -69,7 +74,9 @@ def record(
     shape = (periods, samples)
     for i, name in enumerate(robot.joint_names):
         near = np.exp(-((truth.motion.dtheta[:, i] / 0.1) ** 2))
-        noise = torque_noise * rng.standard_normal(shape) + reversal_noise * near * rng.standard_normal(shape)
+        white = rng.standard_normal(periods * samples)
+        coloured = lfilter([np.sqrt(1.0 - correlation**2)], [1.0, -correlation], white).reshape(shape)
+        noise = torque_noise * coloured + reversal_noise * near * rng.standard_normal(shape)
         columns[f"q_{name}"] = (truth.motion.q[:, i] + encoder_noise * rng.standard_normal(shape)).ravel()
         columns[f"theta_{name}"] = (truth.motion.theta[:, i] + encoder_noise * rng.standard_normal(shape)).ravel()
         columns[f"tau_motor_{name}"] = (truth.tau_motor[:, i] + noise).ravel()

@@ -8,7 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators.base import Estimate, Estimator
-from sea_ident.estimation.estimators.weights import SampleWeights, sample_weights
+from sea_ident.estimation.estimators.weights import SampleWeights, sample_weights, steady
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
@@ -24,6 +24,7 @@ class InstrumentalVariables(Estimator):
 
     With a simulator, Z is the regressor of the simulated motion, with the parameters of the round before (IDIM-IV).
     Without one, the instruments of every period are the regressors of all the others: their noise is another one.
+    Samples near reversal where friction varies from pass to pass are left out, see `steady`.
 
     Attributes:
         simulator: gives the motion that the closed loop makes with given parameters.
@@ -43,7 +44,7 @@ class InstrumentalVariables(Estimator):
 
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
-        first = sample_weights(observations, self.smoothing)
+        first = sample_weights(observations, self.smoothing, steady(observations))
         return (
             self._other_periods(observations, first) if self.simulator is None else self._simulated(observations, first)
         )

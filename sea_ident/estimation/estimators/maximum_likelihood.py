@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, lsmr
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.estimation.estimators.base import Estimate, Estimator
-from sea_ident.estimation.estimators.weights import sample_weights
+from sea_ident.estimation.estimators.weights import sample_weights, steady
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.solve import solve_weighted
 from sea_ident.exceptions import IdentificationError
@@ -49,7 +49,7 @@ class MaximumLikelihood(Estimator):
                 f"{processed.source}: maximum likelihood takes the noise of the angles from the scatter between "
                 "periods; it needs a periodic recording with at least two periods"
             )
-        first = sample_weights(observations, self.smoothing)
+        first = sample_weights(observations, self.smoothing, steady(observations))
         weights = first.weights
         noise = _MotionNoise.build(observations)
         motion, rows = processed.motion, observations.rows

@@ -3,8 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from sea_ident._typing import FloatArray
+from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.solve import Solution, solve_weighted
 from sea_ident.processing.variance import smooth_over_phase
@@ -14,6 +17,15 @@ VARIANCE_FLOOR = 1e-6
 
 ROUNDS = 5
 """Rounds in which the rest of the residual is found."""
+
+FEWEST_PERIODS = 6
+"""Periods from which on the scatter is known well enough to tell where it rises."""
+
+SPEED_BINS = 40
+"""Classes of speed in which the scatter is compared."""
+
+RISE = 1.1
+"""Variance over that at speed from which on friction varies from pass to pass."""
 
 LEAST_REST = 0.2
 """A rest below this share of the noise variance is chance."""
@@ -36,7 +48,9 @@ class SampleWeights:
     warnings: tuple[str, ...]
 
 
-def sample_weights(observations: Observations, smoothing: float) -> SampleWeights:
+def sample_weights(
+    observations: Observations, smoothing: float, keep: NDArray[np.bool_] | None = None
+) -> SampleWeights:
     """Weights from the variance of every sample (paper, eq. 20), smoothed over phase.
 
     The scatter says nothing of what the model lacks. Where the residual is larger than the scatter of the mean, the
@@ -45,6 +59,7 @@ def sample_weights(observations: Observations, smoothing: float) -> SampleWeight
     Args:
         observations: the data.
         smoothing: width of the window [s].
+        keep: (N, n) samples that count; all where the friction model claims to hold, where None.
 
     Returns:
         The weights.
@@ -58,6 +73,8 @@ def sample_weights(observations: Observations, smoothing: float) -> SampleWeight
         variance = smooth_over_phase(variance, processed.interval, smoothing)
     variance, warnings = floored(variance / processed.periods)
     rows, torque, valid = observations.rows, observations.torque, observations.valid
+    if keep is not None:
+        valid = valid & keep
     count = np.maximum(valid.sum(axis=0) - rows.shape[-1] / rows.shape[1], 1.0)
     noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1)
     rest = np.zeros(rows.shape[1])
@@ -75,6 +92,42 @@ def sample_weights(observations: Observations, smoothing: float) -> SampleWeight
         if r > 0.0 and processed.periods > 1
     )
     return SampleWeights(weights, solution, notes, warnings)
+
+
+def steady(observations: Observations) -> NDArray[np.bool_]:
+    """(N, n) False at speeds so low that friction varies from pass to pass.
+
+    Where the torque scatters more near reversal than at speed, friction there is not the same at every pass. Its mean
+    is then not that of the model either: at a pass with more friction the joint is slower at the same instant, so the
+    scatter is not averaged out. Weights of such samples are small but not zero; leaving them out costs little and
+    removes that bias. With few periods, or where no scatter rises, nothing is left out.
+
+    Args:
+        observations: the data.
+
+    Returns:
+        Which samples are steady.
+    """
+    processed = observations.processed
+    speed, keep = np.abs(processed.motion.dtheta), np.ones(processed.tau_motor.shape, dtype=bool)
+    if processed.periods < FEWEST_PERIODS:
+        return keep
+    freedom = processed.periods - 1.0
+    for effect in observations.effects:
+        if not isinstance(effect, CoulombFriction):
+            continue
+        j = observations.robot.index(effect.required_joint)
+        order = np.argsort(speed[:, j])
+        bins = np.array_split(order, SPEED_BINS)
+        level = np.array([processed.raw_tau_variance[part, j].mean() for part in bins])
+        usual = float(np.median(level[SPEED_BINS // 2 :]))
+        error = np.sqrt(2.0 / (freedom * max(len(bins[0]), 1)))
+        # scatter that falls with speed: the best fit of that kind, so that chance in one class does not decide
+        falling = isotonic_regression(level, increasing=False).x
+        low = int(np.count_nonzero(falling > usual * (RISE + error)))
+        if 0 < low <= SPEED_BINS // 2:
+            keep[np.concatenate(bins[:low]), j] = False
+    return keep
 
 
 def floored(variance: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
