@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, Fit
@@ -138,6 +139,8 @@ def examine(
     # those that single precision leaves in doubt are looked at one by one, as are the best
     doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= 10 else set()
     tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
+    if width > 1:
+        tries |= {int(v) for v in np.argsort(gains)[-2:]}
     best: Candidate | None = None
     for v in tries:
         found = _exactly(bench, fit, left, variants[v], shaped[:, v], norms.reshape(count, width)[v], count)
@@ -158,6 +161,8 @@ def _exactly(
     across[:, strength <= ABSORBED] = 0.0
     size = np.where(norms > 0.0, norms, 1.0)
     values = np.linalg.pinv(across, rcond=1e-4) @ left / size
+    if not _allowed(bench, effect, values):
+        values = _allowed_part(bench, effect, across, left) / size
     gain = float((across * size * values).sum(axis=1) @ left)
     amounts = effect.amounts if isinstance(effect, SignalEffect) else ()
     if amounts:
@@ -165,13 +170,25 @@ def _exactly(
         effect = replace(effect, **held)  # type: ignore[arg-type]
     return Candidate(
         effect=effect,
-        gain=gain if _allowed(bench, effect, values) else 0.0,
+        gain=gain,
         columns=len(values),
         tests=tests,
         values=values,
         directions=across * size,
         raw_power=size**2,
     )
+
+
+def _allowed_part(bench: Bench, effect: Effect, across: FloatArray, left: FloatArray) -> FloatArray:
+    """(k,) estimates with as many columns as physics allows: those of the wrong sign are held at zero."""
+    lower = [0.0 if c.nonnegative else -np.inf for c in effect.columns(bench.robot)]
+    scale = np.linalg.norm(across, axis=0)
+    usable = scale > 0.0
+    values = np.zeros(across.shape[1])
+    if np.any(usable):
+        bounds = (np.array(lower)[usable], np.full(int(usable.sum()), np.inf))
+        values[usable] = lsq_linear(across[:, usable], left, bounds).x
+    return values
 
 
 def _coarse(effect: Effect) -> Effect:

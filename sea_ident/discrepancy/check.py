@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.estimation import Model
-from sea_ident.exceptions import DiagnosisError, RecordingError
+from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -19,8 +19,11 @@ CLIPPED_RUN = 4
 CLIPPED_SHARE = 0.05
 """Share of clipped samples beyond which nothing can be told."""
 
-SPIKE = 12.0
-"""Distance from the other periods, in their own spread, that counts as a spike."""
+SPIKE = 8.0
+"""How many times farther than the farthest sample of a usual period a sample must lie to count as a spike."""
+
+SPIKE_DISTANCE = 6
+"""Samples around a reversal in which no spike is looked for."""
 
 
 @dataclass(frozen=True)
@@ -99,20 +102,19 @@ def _fingerprint(recording: Recording | ProcessedRecording) -> FloatArray | None
 
 
 def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) -> FloatArray | None:
-    """(P, n) mean temperature of every period [degC], None where it was not measured at every joint."""
+    """(P, n) mean temperature of every period [degC], NaN at joints where it was not measured; None without any."""
     if isinstance(recording, ProcessedRecording):
         return None
     names = data.robot.joint_names
-    try:
-        values = recording.channel("temperature", names)
-    except RecordingError:
-        return None
-    # the last whole periods, as the processing takes them
     samples = round(data.period * recording.sample_rate)
+    # the last whole periods, as the processing takes them
     count = data.periods * samples
-    if len(values) < count:
-        return None
-    return np.asarray(values[len(values) - count :].reshape(data.periods, samples, -1).mean(axis=1), dtype=np.float64)
+    out = np.full((data.periods, len(names)), np.nan)
+    for i, name in enumerate(names):
+        if recording.has("temperature", name) and recording.samples >= count:
+            values = recording.channel("temperature", [name])[recording.samples - count :, 0]
+            out[:, i] = values.reshape(data.periods, samples).mean(axis=1)
+    return out if np.any(np.isfinite(out)) else None
 
 
 def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tuple[PeriodData, Findings]:
@@ -166,35 +168,29 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
 
 
 def _spiked_periods(data: PeriodData) -> set[int]:
+    """Periods with a sample far from its neighbours, farther than any sample of a usual period.
+
+    Reversals are left aside: what happens there differs from pass to pass by itself.
+    """
     if data.periods < 4:
         return set()
     out: set[int] = set()
-    stacks = [
-        data.period_tau_motor,
-        *(np.stack([getattr(m, k) for m in data.period_motions]) for k in ("ddq", "ddtheta")),
-    ]
-    reversals = _reversals(data)
-    for stack in stacks:
-        middle = np.median(stack, axis=0)
-        distance = np.abs(stack - middle)
-        usual = 1.4826 * np.median(distance, axis=0)
-        # near a reversal the spread is what it is there; nowhere is it smaller than in general
-        scale = np.maximum(usual, np.median(usual, axis=0))
-        span = np.ptp(middle, axis=0)
-        far = (distance > SPIKE * scale) & (distance > 0.2 * span) & (scale > 0.0) & ~reversals
-        out |= {int(p) for p in np.flatnonzero(far.any(axis=(1, 2)))}
+    accelerations = [np.stack([getattr(m, kind) for m in data.period_motions]) for kind in ("ddq", "ddtheta")]
+    torque = np.diff(
+        data.period_tau_motor, n=2, axis=1, prepend=data.period_tau_motor[:, -1:], append=data.period_tau_motor[:, :1]
+    )
+    for stack in (torque, *accelerations):
+        for i in range(data.robot.n):
+            away = np.ones(data.samples, dtype=np.bool_)
+            for e, equation in enumerate(data.equations):
+                if equation.index == i:
+                    for shift in range(-SPIKE_DISTANCE, SPIKE_DISTANCE + 1):
+                        away &= ~np.roll(data.left_out[:, e], shift)
+            if np.count_nonzero(away) < 16:
+                continue
+            largest = np.max(np.abs(stack[:, away, i] - np.median(stack[:, away, i], axis=0)), axis=1)
+            out |= {int(p) for p in np.flatnonzero(largest > SPIKE * np.median(largest))}
     return out
-
-
-def _reversals(data: PeriodData) -> NDArray[np.bool_]:
-    """(N, n) samples at which, in some period, a motor turns back within two samples.
-
-    There friction and the efficiency of the transmission (paper, eq. 7) change sides: a sample in which one period has
-    already turned and the others have not is no spike, nor is the jerk of a motor that comes loose.
-    """
-    forward = np.stack([motion.dtheta > 0.0 for motion in data.period_motions])
-    near = np.concatenate([np.roll(forward, shift, axis=1) for shift in range(-2, 3)])
-    return np.asarray(near.any(axis=0) & ~near.all(axis=0), dtype=np.bool_)
 
 
 def _subset(data: PeriodData, keep: list[int]) -> PeriodData:

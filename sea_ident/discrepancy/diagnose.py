@@ -90,12 +90,16 @@ def diagnose(
         from sea_ident.discrepancy.unrepeated import diagnose_unrepeated
 
         return diagnose_unrepeated(model, processed, recording)
-    data, notes = check.cleaned(period_data(processed, robot), recording)
+    whole = period_data(processed, robot)
+    temperature = check.temperatures(recording, whole)
+    data, notes = check.cleaned(whole, recording)
+    if temperature is not None and len(temperature) != data.periods:
+        temperature = None
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
     selection = search(bench, bench.effects)
     tell("comparing the periods", 0.5)
-    trends = compare_periods(bench, selection.final.fit, selection.final.noise, check.temperatures(recording, data))
+    trends = compare_periods(bench, selection.final.fit, selection.final.noise, temperature)
     tell("looking for alternatives", 0.6)
     alternatives = assess.rivals(bench, selection)
     tell("testing on held-out data", 0.75)

@@ -30,6 +30,12 @@ SMALLEST_SHARE = 1e-3
 BESIDE_ANOTHER = 0.05
 """And by this share of what the largest effect beside it does: the form of that one is never known better."""
 
+LARGEST_TIMES_TORQUE = 1.5
+"""No effect is larger than this many times the torque of the motor (rms)."""
+
+EXCUSED = 0.02
+"""Share of the power of an effect that may be in a column of the wrong sign."""
+
 FINALISTS = 5
 """Candidates that are refitted with everything free before one is accepted."""
 
@@ -197,12 +203,27 @@ def penalty(effect: Effect, bench: Bench) -> float:
 
 
 def physical(bench: Bench, fit: Fit, position: int) -> bool:
-    """Whether an effect of a model respects the signs that physics demands, within two standard deviations."""
+    """Whether an effect of a model is possible.
+
+    A column that must not be negative is not, but for what its uncertainty or a small share of the effect excuses; and
+    the effect is not larger than all the torque there is, which only two effects that cancel each other could be.
+    """
     position %= len(fit.effects)
+    effect = fit.effects[position]
     counts = bench.counts(fit.effects)
     start = sum(counts[:position])
-    for k, column in enumerate(fit.effects[position].columns(bench.robot), start=start):
-        if column.nonnegative and fit.values[k] < -2.0 * fit.std(k):
+    columns = effect.columns(bench.robot)
+    if not columns:
+        return True
+    values = fit.values[start : start + len(columns)]
+    spectra = bench.column_spectra(effect, fit.effects)
+    power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))
+    total = np.sqrt(np.sum(np.abs(spectra @ values) ** 2, axis=0))
+    if np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms):
+        return False
+    for k, column in enumerate(columns):
+        wrong = column.nonnegative and values[k] < -2.0 * fit.std(start + k)
+        if wrong and power[k] > EXCUSED * float(power.sum()):
             return False
     return True
 

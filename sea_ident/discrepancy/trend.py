@@ -100,7 +100,9 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     while len(named) < MOST_TRENDS and directions:
         gains = [_gain(left, d) for d in directions]
         best = int(np.argmax(gains))
-        p_value = _p_value(gains[best], directions[best].basis.shape[1], tests, noise)
+        p_value = max(
+            _p_value(gains[best], directions[best].basis.shape[1], tests, noise), _scatter_p(left, directions[best])
+        )
         if p_value > LEVEL or _change(bench, left, directions[best], periods) < SMALLEST_CHANGE:
             break
         named.append((directions[best], gains[best], p_value))
@@ -109,7 +111,9 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     if not named and directions:
         gains = [_gain(flat, d) for d in directions]
         best = int(np.argmax(gains))
-        column_p = _p_value(gains[best], directions[best].basis.shape[1], tests, noise)
+        column_p = max(
+            _p_value(gains[best], directions[best].basis.shape[1], tests, noise), _scatter_p(flat, directions[best])
+        )
     trends = tuple(
         _trend(bench, flat, d, gain, p, directions, [o for o, _, _ in named if o is not d]) for d, gain, p in named
     )
@@ -143,6 +147,7 @@ def _directions(
         own = None
         if temperature is not None and effect.joint is not None:
             own = temperature[:, bench.robot.index(effect.joint)]
+            own = own if np.all(np.isfinite(own)) else None
         try:
             spectra = bench.spectra_of(effect.steady(state), fit.effects) * fit.scale[:, None]
             variants = [replace(effect, time_constant=c) for c in _time_constants(effect, middle)]
@@ -185,6 +190,22 @@ def _explained(flat: FloatArray, directions: list[_Direction]) -> FloatArray:
 
 def _p_value(gain: float, columns: int, tests: int, noise: NoiseFloor) -> float:
     return min(1.0, tests * float(stats.f.sf(gain / columns, columns, max(noise.total_freedom, 4.0))))
+
+
+def _scatter_p(flat: FloatArray, direction: _Direction) -> float:
+    """Probability of the trend by the scatter of the periods along its own columns.
+
+    Noise that gathers where the columns are large (friction that differs from pass to pass) is larger there than the
+    noise floor, which is one for all phases of the period, says.
+    """
+    profile = direction.profile / np.linalg.norm(direction.profile)
+    along = flat @ direction.basis
+    amount = profile @ along
+    rest = along - np.outer(profile, amount)
+    freedom = len(flat) - 2
+    width = direction.basis.shape[1]
+    spread = float(np.sum(rest**2)) / max(freedom * width, 1)
+    return float(stats.f.sf(float(amount @ amount) / width / max(spread, 1e-300), width, max(freedom * width, 1)))
 
 
 def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:

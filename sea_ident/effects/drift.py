@@ -1,5 +1,6 @@
 """Effects that change in the course of a recording."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,6 +13,22 @@ from sea_ident.robot import Robot
 _MINUTE = 60.0
 
 
+class TrendEffect(ABC):
+    """An effect that is a column times a change in time.
+
+    The time of the motion is that of the recording: the columns of one mean period show next to nothing, and the
+    comparison of the periods shows it all. A search asks for the two factors separately.
+    """
+
+    @abstractmethod
+    def steady(self, state: State) -> Contribution:
+        """Link and motor rows (N, n, k) for a change of one."""
+
+    @abstractmethod
+    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
+        """Change at the times (P,) [s], with the temperatures (P,) of its joint where they are measured [degC]."""
+
+
 def warming(time: FloatArray, time_constant: float) -> FloatArray:
     """Change at the times (any shape) [s] that starts at a rate of one per minute and ends with a time constant.
 
@@ -22,11 +39,8 @@ def warming(time: FloatArray, time_constant: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class DriftEffect(JointEffect):
+class DriftEffect(JointEffect, TrendEffect):
     """Columns of a joint, as `local_columns` gives them, times a change in time.
-
-    The time of the motion is that of the recording: the columns of one mean period show next to nothing, and the
-    comparison of the periods shows it all.
 
     Attributes:
         joint: joint at which it acts.
@@ -37,11 +51,19 @@ class DriftEffect(JointEffect):
 
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 20.0, 1e4, points=4),)
 
+    def steady(self, state: State) -> Contribution:
+        """Columns for a change of one."""
+        return JointEffect.evaluate(self, state)
+
+    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
+        """The drift."""
+        return warming(time, self.time_constant)
+
     def evaluate(self, state: State) -> Contribution:
         """Columns times the drift."""
-        rows = super().evaluate(state)
+        rows = self.steady(state)
         change = warming(state.motion.time, self.time_constant)[:, None, None]
-        return Contribution(rows.link * change, rows.motor * change)
+        return Contribution(rows.link * change, rows.motor * change, rows.joint)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The columns at the present state and time, times the values."""

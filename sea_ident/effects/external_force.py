@@ -1,15 +1,24 @@
 """A push from outside during part of the time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Action, Column, Contribution, Effect, Shape, Side, SimulationState, State
+from sea_ident.effects.signal import is_closed
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
+
+
+_BEGINS = 32
+"""Beginnings of a push that a search tries in a period."""
+
+_LENGTHS = (2, 4, 6, 9)
+"""Its lengths, in steps between two beginnings."""
 
 
 @dataclass(frozen=True)
@@ -19,11 +28,13 @@ class ExternalForce(Effect):
     Attributes:
         joint: joint whose link is pushed.
         start: [s].
-        stop: [s].
+        stop: [s]; before `start` where a periodic push goes on round the end of the period.
+        period: after which the push comes again, 0 where it comes once [s].
     """
 
     start: float = 0.0
-    stop: float = float("inf")
+    stop: float = 1e6
+    period: float = 0.0
 
     name: ClassVar[str] = "external_force"
     side: ClassVar[Side] = Side.LINK
@@ -42,14 +53,16 @@ class ExternalForce(Effect):
 
     def evaluate(self, state: State) -> Contribution:
         """-J' while it pushes."""
-        motion, robot = state.motion, state.robot
-        link = np.zeros((len(motion), robot.n, 3))
-        pushes = np.flatnonzero((motion.time >= self.start) & (motion.time <= self.stop))
-        body, data = self._body(robot), robot.extended_model.createData()
-        for k in pushes:
-            x = robot.extended_state(motion.q[k], motion.theta[k])
-            link[k] = -robot.link_map.T @ _jacobian(robot, data, body, x)
-        return Contribution(link, np.zeros_like(link))
+        jacobian = _jacobians(state, self._body(state.robot))
+        link = np.where(self.pushes(state.motion.time)[:, None, None], -jacobian, 0.0)
+        return Contribution(link, np.broadcast_to(0.0, link.shape))
+
+    def pushes(self, time: FloatArray) -> NDArray[np.bool_]:
+        """Whether it pushes at the times (any shape) [s]."""
+        phase = np.mod(time, self.period) if self.period > 0.0 else np.asarray(time)
+        if self.stop >= self.start:
+            return np.asarray((phase >= self.start) & (phase <= self.stop))
+        return np.asarray((phase >= self.start) | (phase <= self.stop))
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The same at the present state."""
@@ -57,15 +70,25 @@ class ExternalForce(Effect):
         force = np.asarray(values, dtype=np.float64)
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            if self.start <= state.time <= self.stop:
+            if bool(self.pushes(np.array(state.time))):
                 x = robot.extended_state(state.q, state.theta)
                 link[:] -= robot.link_map.T @ (_jacobian(robot, data, body, x) @ force)
 
         return act
 
     def variants(self, state: State) -> tuple["ExternalForce", ...]:
-        """None but itself: the times come from the residual."""
-        return (self,)
+        """Where the motion closes on itself, pushes in every period: begin and length in steps of a fraction of it."""
+        motion = state.motion
+        if not is_closed(motion.q):
+            return (self,)
+        period = float(motion.time[-1] - motion.time[0]) * len(motion) / (len(motion) - 1)
+        found = []
+        for first in range(_BEGINS):
+            for length in _LENGTHS:
+                start = first * period / _BEGINS
+                stop = float(np.mod(start + length * period / _BEGINS, period))
+                found.append(replace(self, start=start, stop=stop, period=period))
+        return tuple(found)
 
     def _body(self, robot: Robot) -> int:
         if self.joint is None:
@@ -73,6 +96,17 @@ class ExternalForce(Effect):
         robot.index(self.joint)
         names = [robot.extended_model.names[int(index)] for index in robot.body_indices]
         return int(robot.body_indices[names.index(self.joint)])
+
+
+def _jacobians(state: State, body: int) -> FloatArray:
+    """(N, n, 3) transposed Jacobians of the centre of mass of a body in the link rows, computed once per state."""
+    kept: dict[int, FloatArray] = state.__dict__.setdefault("_jacobians", {})
+    if body not in kept:
+        robot, motion = state.robot, state.motion
+        data = robot.extended_model.createData()
+        x = robot.extended_state(motion.q, motion.theta)
+        kept[body] = np.stack([robot.link_map.T @ _jacobian(robot, data, body, each) for each in x])
+    return kept[body]
 
 
 def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray) -> FloatArray:

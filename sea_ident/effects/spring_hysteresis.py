@@ -37,7 +37,8 @@ class SpringHysteresis(MemoryEffect):
         """One column per element: the torque at which it slips."""
         torque, _ = self.units_of(robot)
         return tuple(
-            Column(self.parameter_name(label), torque, self.name, self.joint, self.side) for label in ("narrow", "wide")
+            Column(self.parameter_name(label), torque, self.name, self.joint, self.side, True)
+            for label in ("narrow", "wide")
         )
 
     def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:

@@ -18,12 +18,13 @@ from sea_ident.effects.base import (
     State,
     smooth_sign,
 )
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class TemperatureFriction(JointEffect):
+class TemperatureFriction(JointEffect, TrendEffect):
     """Viscous and Coulomb friction of the motor, times T - T_0.
 
     Attributes:
@@ -66,8 +67,22 @@ class TemperatureFriction(JointEffect):
             raise EffectError(f"the effect {self.name!r} needs the channel temperature_{self.joint} [degC]")
         i = state.robot.index(self.required_joint)
         above = state.channels["temperature"][:, i] - self.reference
-        rows = super().evaluate(state)
-        return Contribution(rows.link * above[:, None, None], rows.motor * above[:, None, None])
+        rows = self.steady(state)
+        return Contribution(rows.link * above[:, None, None], rows.motor * above[:, None, None], rows.joint)
+
+    def steady(self, state: State) -> Contribution:
+        """Columns for one kelvin."""
+        return JointEffect.evaluate(self, state)
+
+    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
+        """Measured temperature above the reference.
+
+        Raises:
+            EffectError: if it was not measured.
+        """
+        if temperature is None:
+            raise EffectError(f"the effect {self.name!r} needs the channel temperature_{self.joint} [degC]")
+        return temperature - self.reference
 
     def anchored(self, anchor: Anchor) -> "TemperatureFriction":
         """With the smoothing of the model's Coulomb friction."""

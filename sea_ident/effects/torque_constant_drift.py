@@ -7,13 +7,13 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Action, Column, Contribution, Shape, Side, SimulationState, State
-from sea_ident.effects.drift import warming
+from sea_ident.effects.drift import TrendEffect, warming
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class TorqueConstantDrift(LoadEffect):
+class TorqueConstantDrift(LoadEffect, TrendEffect):
     """tau_m times the drift, in the motor row.
 
     Attributes:
@@ -39,6 +39,14 @@ class TorqueConstantDrift(LoadEffect):
         """Motor torque times the drift."""
         column = self.motor_torque(state) * warming(state.motion.time, self.time_constant)
         return state.at(self.side, self.at, column[:, None])
+
+    def steady(self, state: State) -> Contribution:
+        """Motor torque."""
+        return state.at(self.side, self.at, self.motor_torque(state)[:, None])
+
+    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
+        """The drift."""
+        return warming(time, self.time_constant)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The part of the commanded torque that is lost."""

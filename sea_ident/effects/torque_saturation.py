@@ -1,17 +1,29 @@
 """Torque that falls behind the current when the motor is overloaded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Column, Contribution, Side, SimulationState, State
+from sea_ident.effects.base import Action, Anchor, Column, Contribution, Side, SimulationState, State
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
 
 
+_STEPS = 12
+"""Newton steps from the torque to the command."""
+
+
 @dataclass(frozen=True)
 class TorqueSaturation(LoadEffect):
-    """C tau_m^3 in the motor row: the commanded torque that saturation takes away."""
+    """C u^3 in the motor row, u being the commanded torque: what saturation takes away from it.
+
+    Attributes:
+        coefficient: c of the model, by which u follows from the torque that the motor gives: u - c u^3 = tau_m.
+    """
+
+    coefficient: float = 0.0
 
     name: ClassVar[str] = "torque_saturation"
     side: ClassVar[Side] = Side.MOTOR
@@ -22,9 +34,22 @@ class TorqueSaturation(LoadEffect):
         unit = robot.joints[robot.index(self.at)].torque_unit
         return (Column(self.parameter_name(), f"1/({unit})^2", self.name, self.joint, self.side, True),)
 
+    def anchored(self, anchor: Anchor) -> "TorqueSaturation":
+        """With the load and the saturation of the model."""
+        loaded = super().anchored(anchor)
+        return replace(loaded, coefficient=max(anchor.value(self.parameter_name()), 0.0))
+
     def evaluate(self, state: State) -> Contribution:
-        """Cube of the motor torque."""
-        return state.at(self.side, self.at, self.motor_torque(state)[:, None] ** 3)
+        """Cube of the commanded torque."""
+        torque = self.motor_torque(state)
+        command = torque
+        if self.coefficient > 0.0:
+            largest = 1.0 / np.sqrt(3.0 * self.coefficient)
+            for _ in range(_STEPS):
+                error = command - self.coefficient * command**3 - torque
+                slope = np.maximum(1.0 - 3.0 * self.coefficient * command**2, 0.1)
+                command = np.clip(command - error / slope, -largest, largest)
+        return state.at(self.side, self.at, command[:, None] ** 3)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The cube of the commanded torque."""
