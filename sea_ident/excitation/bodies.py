@@ -140,7 +140,7 @@ class BodyColumns:
         axes = np.zeros((model.njoints, 6))
         paths: list[IntArray] = [np.zeros(0, dtype=np.intp)]
         for k in range(1, model.njoints):
-            jacobian = pin.getJointJacobian(model, data, k, pin.ReferenceFrame.LOCAL)
+            jacobian = pin.getJointJacobian(model, data, k, pin.ReferenceFrame.LOCAL).reshape(6, model.nv)
             axes[k] = jacobian[:, model.joints[k].idx_v]
             paths.append(np.append(paths[model.parents[k]], k))
         return BodyColumns(

@@ -38,6 +38,7 @@ class Criterion(ABC):
     """A function of the information matrix that is to be made large."""
 
     name: ClassVar[str]
+    tolerance: ClassVar[float] = 1e-4  # gain of a step that is too small to go on for
 
     @abstractmethod
     def value(self, matrix: FloatArray) -> float:
@@ -116,6 +117,7 @@ class DOptimality(Criterion):
     """
 
     name: ClassVar[str] = "D"
+    tolerance: ClassVar[float] = 1e-3
 
     def value(self, matrix: FloatArray) -> float:
         """Natural logarithm of the determinant."""

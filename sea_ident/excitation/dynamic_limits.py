@@ -1,12 +1,14 @@
 """Limits on motor torque and spring deflection: nonlinear in the motion, through the robot's prior parameters."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
-from sea_ident.effects import JointEffect
+from sea_ident.effects import JointEffect, make_effect
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
@@ -46,7 +48,7 @@ class DynamicLimits:
     robot: Robot
     names: tuple[str, ...]
     rows: IntArray
-    springs: FloatArray
+    springs: NDArray[np.bool_]
     bound: FloatArray
     units: tuple[str, ...]
     friction: tuple[KnownFriction, ...]
@@ -69,15 +71,20 @@ class DynamicLimits:
         both = robot.link_map + robot.motor_map
         return np.where(self.springs[None, :], robot.link_map[:, self.rows], both[:, self.rows])
 
-    def evaluate(self, motion: Motion, *, derivatives: bool = True) -> tuple[FloatArray, FloatArray]:
+    def evaluate(
+        self, motion: Motion, *, derivatives: bool = True, shifts: Sequence[FloatArray] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Torques of a motion.
 
         Args:
             motion: (N, n) motion; theta = q.
             derivatives: whether to compute them.
+            shifts: velocities (n,) or (N, n) that are added to those of the joints where friction is computed
+                [rad/s]; the torques follow for each of them in turn.
 
         Returns:
-            (N, r) torques and (N, r, 3 n) derivatives by q, q' and q'' (empty if not asked for).
+            (N, r) torques (r more for every further shift), and their derivatives (N, r, 3 n) by q, q' and q'' (empty
+            if not asked for).
         """
         robot, n = self.robot, self.robot.n
         both = robot.link_map + robot.motor_map
@@ -89,40 +96,34 @@ class DynamicLimits:
             folded = np.swapaxes(bodies.slopes()[:, :, 0], 1, 2) @ self.fold  # (N, 3 nv, r)
             for k in range(3):
                 slopes[:, :, k * n : (k + 1) * n] = np.swapaxes(both.T @ folded[:, k * nv : (k + 1) * nv], 1, 2)
-        for friction in self.friction:
-            i = friction.joint
-            places = np.flatnonzero((self.rows == i) & (friction.link | ~self.springs.astype(bool)))
-            if not len(places):
-                continue
-            state = (motion.q[:, i], motion.dq[:, i], motion.q[:, i], motion.dq[:, i])
-            torque[:, places] += (friction.effect.local_columns(*state) @ friction.values)[:, None]
-            if derivatives:
+        shifted = [np.zeros(n)] if shifts is None else list(shifts)
+        torque, slopes = np.tile(torque, (1, len(shifted))), np.tile(slopes, (1, len(shifted), 1))
+        for k, shift in enumerate(shifted):
+            for friction in self.friction:
+                i = friction.joint
+                places = np.flatnonzero((self.rows == i) & (friction.link | ~self.springs)) + k * len(self)
+                velocity = motion.dq[:, i] + shift[..., i]
+                state = (motion.q[:, i], velocity, motion.q[:, i], velocity)
+                torque[:, places] += (friction.effect.local_columns(*state) @ friction.values)[:, None]
+                if not derivatives:
+                    continue
                 for part, block in zip(local_slopes(friction.effect, *state), (0, 1, 0, 1), strict=True):
                     if part is not None:
                         slopes[:, places, block * n + i] += (part @ friction.values)[:, None]
         return torque, slopes
 
-    def friction_rise(self, motion: Motion, faster: FloatArray) -> FloatArray:
-        """How much friction can rise when every joint turns faster.
-
-        Args:
-            motion: (N, n) motion.
-            faster: (n,) how much [rad/s].
-
-        Returns:
-            (N, r) torques.
-        """
-        rise = np.zeros((len(motion), len(self)))
+    def smoothed(self, smoothing: FloatArray) -> "DynamicLimits":
+        """The limits with friction that turns over within at least (n,) velocities [rad/s]."""
+        widened = []
         for friction in self.friction:
-            i = friction.joint
-            places = np.flatnonzero((self.rows == i) & (friction.link | ~self.springs.astype(bool)))
-            now, still = np.abs(motion.dq[:, i]), np.zeros(len(motion))
-            then = now + faster[i]
-            values = [friction.effect.local_columns(still, v, still, v) @ friction.values for v in (now, then)]
-            # where the sign may turn within the step, the whole of it is taken
-            jump = np.where(now < faster[i], values[0] + values[1], values[1] - values[0])
-            rise[:, places] += jump[:, None]
-        return rise
+            shape = friction.effect.shape_values
+            if "smoothing" in shape:
+                shape["smoothing"] = max(shape["smoothing"], float(smoothing[friction.joint]))
+                effect = make_effect(friction.effect.name, friction.effect.joint, **shape)
+                assert isinstance(effect, JointEffect)
+                friction = replace(friction, effect=effect)
+            widened.append(friction)
+        return replace(self, friction=tuple(widened))
 
 
 def dynamic_limits(robot: Robot, limits: Limits, notes: list[str]) -> DynamicLimits:

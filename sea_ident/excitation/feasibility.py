@@ -122,7 +122,7 @@ def comfortable_position(
         limits: linear limits.
         walls: torque and other limits.
         harmonics: L of the trajectories that the walls take.
-        names: of the walls' limits, in order.
+        names: of the walls' limits, in order; again from the first where there are more values.
         generator: of random positions, tried if the middle of the limits is outside.
 
     Returns:
@@ -152,7 +152,7 @@ def comfortable_position(
             break
     if best_room <= 1e-3:
         tight = np.flatnonzero(best_values <= 1e-3)
-        described = ", ".join(names[int(k)] for k in tight)
+        described = ", ".join(dict.fromkeys(names[int(k) % len(names)] for k in tight))
         raise InfeasibleError(
             f"no position was found at which the robot can stay inside {described}; the best of 400 lacks "
             f"{max(-100.0 * best_room, 0.0):.3g} % of the range. Widen these limits"
@@ -165,7 +165,9 @@ def _room(walls: Sequence[Wall], rest: FloatArray) -> tuple[float, FloatArray]:
     parts = [np.ones(0)]
     for wall in walls:
         value = wall.values(rest)[:, :1]
-        half = np.where(np.isfinite(wall.upper - wall.lower), 0.5 * (wall.upper - wall.lower), 1.0)
+        both = np.isfinite(wall.upper) & np.isfinite(wall.lower)
+        one = np.where(np.isfinite(wall.upper), np.abs(wall.upper), np.abs(wall.lower))
+        half = np.where(both, 0.5 * (wall.upper - wall.lower), one)
         parts.append((np.minimum(value - wall.lower, wall.upper - value) / half)[:, 0])
     room = np.concatenate(parts)
     return float(room.min(initial=1.0)), room

@@ -26,6 +26,8 @@ _LINEAR_POINTS = 32
 _DYNAMIC_POINTS = 16
 # part of torque limits left free for what a proof for all times takes
 _RESERVE = 2e-3
+# part of the velocity range within which friction turns over for the walls
+_TURNING = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,13 @@ class Problem:
         nonlinear: list[Wall] = []
         if len(dynamic):
             nonlinear.append(
-                DynamicWall.of(dynamic.tightened(_RESERVE), frequency, harmonics, _DYNAMIC_POINTS * harmonics)
+                DynamicWall.of(
+                    dynamic.tightened(_RESERVE),
+                    frequency,
+                    harmonics,
+                    _DYNAMIC_POINTS * harmonics,
+                    _turning(linear),
+                )
             )
         position = comfortable_position(
             linear, nonlinear, harmonics, dynamic.names, np.random.default_rng([seed, 2**31])
@@ -136,19 +144,23 @@ class Problem:
 
     def settle(self, coefficients: FloatArray) -> FloatArray:
         """Shrink a trajectory toward rest by the little that it takes to be inside for all t."""
-        factor = 1.0
-        for _ in range(60):
-            trial = self.centre + factor * (coefficients - self.centre)
-            exact = shrink(self.limits, self.series(trial), self.centre[:, -1])
-            if exact < 1.0:
-                factor *= exact * (1.0 - 1e-13)
-                continue
-            margins = self.margins(trial)
-            if float(margins.min(initial=0.0)) >= 0.0:
-                return trial
-            beyond = -margins[len(self.limits) :] / self.dynamic.bound
-            factor *= 1.0 - max(1e-5, 0.5 * float(beyond.max(initial=0.0)))
-        return self.centre
+
+        def shrunk(factor: float) -> FloatArray:
+            return self.centre + factor * (coefficients - self.centre)
+
+        largest = 1.0
+        while (exact := shrink(self.limits, self.series(shrunk(largest)), self.centre[:, -1])) < 1.0:
+            largest *= exact * (1.0 - 1e-13)
+        low, high = largest, largest
+        step = 1e-4
+        while low > 0.0 and float(self.margins(shrunk(low)).min(initial=0.0)) < 0.0:
+            low, high = max(0.0, low - step), low
+            step *= 3.0
+        # between a factor that is inside and one that is not
+        while high - low > 1e-4:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if float(self.margins(shrunk(middle)).min()) >= 0.0 else (low, middle)
+        return shrunk(low)
 
     def ramps(self, coefficients: FloatArray, ramp: Ramp) -> tuple[RampMotion, RampMotion]:
         """From rest into a trajectory, and back to rest.
@@ -210,6 +222,14 @@ class Problem:
             ramp_out=ramps[1],
             warnings=notes,
         )
+
+
+def _turning(limits: LinearLimits) -> FloatArray:
+    """(n,) velocity within which friction turns over for the walls: a small part of the largest one."""
+    turning = np.zeros(limits.joints.shape[1])
+    for k in np.flatnonzero(limits.derivative == 1):
+        turning[limits.joints[k] != 0.0] = _TURNING * limits.upper[k]
+    return turning
 
 
 def _smoothed(effect: Effect, robot: Robot, smoothing: FloatArray) -> Effect:

@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.barrier import raise_inside
+from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.feasibility import random_start, repair
 from sea_ident.excitation.information import Information
 from sea_ident.excitation.problem import Problem
@@ -105,11 +106,14 @@ def climb_from_starts(
 
     def scout(start: int) -> float:
         generator = np.random.default_rng([seed, start])
-        for _ in range(_DRAWS):
-            if start < starts or given is None:
-                point = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
-            else:
-                point = repair(problem.limits, problem.base_frequency, problem.centre, given)
+        for draw in range(_DRAWS):
+            point = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
+            if start >= starts and given is not None:
+                # limits are convex: what lies between two trajectories inside is inside too
+                share = draw / (_DRAWS - 1)
+                point = share * point + (1.0 - share) * repair(
+                    problem.limits, problem.base_frequency, problem.centre, given
+                )
             point = _loosen(problem, point)
             information = problem.coarse(_SCOUT_SAMPLES * harmonics, 0.3 * _speed(problem, point))
             if np.isfinite(problem.value(information, point)):
@@ -117,14 +121,19 @@ def climb_from_starts(
         else:
             raise ExcitationError(_singular(problem, information, point))
         board.latest[start] = point
-        return _raise(problem, information, board, start, _SCOUT_STEPS, 1e-2, 3e-2)
+        # log det is the smoothest way to where all parameters are seen, whatever is asked for in the end; but its
+        # optimum need not be near that of another criterion: every other start goes straight for that
+        criterion = problem.criterion if start % 2 else DOptimality()
+        _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, 30.0 * criterion.tolerance)
+        return problem.value(information, board.latest[start])
 
     def climb(start: int) -> None:
         point = board.latest[start]
         samples = min(problem.fine.sampling.samples, _CLIMB_SAMPLES * harmonics)
         spacing = 1.0 / (problem.base_frequency * samples)
         information = problem.coarse(samples, 0.5 * spacing * _speed(problem, point, derivative=2))
-        _raise(problem, information, board, start, _CLIMB_STEPS, 1e-3, 1e-3)
+        criterion = problem.criterion
+        _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, criterion.tolerance)
 
     interrupted = False
     try:
@@ -145,12 +154,19 @@ def climb_from_starts(
 
 
 def _raise(
-    problem: Problem, information: Information, board: _Board, start: int, steps: int, barrier: float, tolerance: float
-) -> float:
-    """Climb from the latest trajectory of a start; the criterion reached."""
-    point = raise_inside(
+    problem: Problem,
+    information: Information,
+    criterion: Criterion,
+    board: _Board,
+    start: int,
+    steps: int,
+    barrier: float,
+    tolerance: float,
+) -> None:
+    """Climb from the latest trajectory of a start."""
+    board.latest[start] = raise_inside(
         information,
-        problem.criterion,
+        criterion,
         problem.walls,
         problem.centre,
         board.latest[start],
@@ -159,8 +175,6 @@ def _raise(
         tolerance=tolerance,
         report=lambda value, found: board.note(start, value, found),
     )
-    board.latest[start] = point
-    return problem.value(information, point)
 
 
 def _singular(problem: Problem, information: Information, point: FloatArray) -> str:

@@ -139,44 +139,63 @@ def _spread(values: FloatArray) -> FloatArray:
 class DynamicWall:
     """Torque limits on an equidistant grid.
 
+    Friction turns over within a fraction of a step of the grid. So each limit is taken twice: the upper one with the
+    friction of the highest velocity that can be reached on the way to the nearest grid point, the lower one with that
+    of the lowest.
+
     Attributes:
-        limits: the limits.
+        limits: the limits, with friction that the grid can show.
         base_frequency: of the series [Hz].
         bases: (3, M, 2 L + 1) bases of position, velocity and acceleration.
+        smoothing: (n,) velocities within which friction turns over on this grid [rad/s].
     """
 
     limits: DynamicLimits
     base_frequency: float
     bases: FloatArray
+    smoothing: FloatArray
 
     @staticmethod
-    def of(limits: DynamicLimits, base_frequency: float, harmonics: int, points: int) -> "DynamicWall":
-        """On `points` times of a period."""
+    def of(
+        limits: DynamicLimits, base_frequency: float, harmonics: int, points: int, smoothing: FloatArray
+    ) -> "DynamicWall":
+        """On `points` times of a period, with friction that turns over within (n,) velocities [rad/s]."""
         time = np.arange(points) / (points * base_frequency)
         bases = [fourier_basis(time, base_frequency, harmonics, order) for order in range(3)]
-        return DynamicWall(limits, base_frequency, np.array(bases))
+        return DynamicWall(limits.smoothed(smoothing), base_frequency, np.array(bases), smoothing)
+
+    def _shifts(self, motion: Motion) -> tuple[FloatArray, ...]:
+        """(M, n) changes of velocity on the way to the nearest grid point, and what smoothing takes off friction."""
+        if not self.limits.friction:
+            return (np.zeros_like(motion.dq),)
+        reach = 0.5 * np.abs(motion.ddq) / (len(motion) * self.base_frequency) + self.smoothing
+        return reach, -reach
 
     @property
     def lower(self) -> FloatArray:
-        """(r, 1)."""
-        return -self.limits.bound[:, None]
+        """(r, 1); (2 r, 1) with friction."""
+        bound = -self.limits.bound[:, None]
+        return np.concatenate([np.full_like(bound, -np.inf), bound]) if self.limits.friction else bound
 
     @property
     def upper(self) -> FloatArray:
-        """(r, 1)."""
-        return self.limits.bound[:, None]
+        """(r, 1); (2 r, 1) with friction."""
+        bound = self.limits.bound[:, None]
+        return np.concatenate([bound, np.full_like(bound, np.inf)]) if self.limits.friction else bound
 
     def _motion(self, coefficients: FloatArray) -> Motion:
         q, dq, ddq = (basis @ coefficients.T for basis in self.bases)
         return Motion.rigid(np.arange(len(q), dtype=np.float64), q, dq, ddq)
 
     def values(self, coefficients: FloatArray) -> FloatArray:
-        """(r, M)."""
-        return self.limits.evaluate(self._motion(coefficients), derivatives=False)[0].T
+        """(r, M); (2 r, M) with friction."""
+        motion = self._motion(coefficients)
+        return self.limits.evaluate(motion, derivatives=False, shifts=self._shifts(motion))[0].T
 
     def tangent(self, coefficients: FloatArray) -> "DynamicTangent":
         """Slopes of all torques by all coefficients."""
-        _, slopes = self.limits.evaluate(self._motion(coefficients))
+        motion = self._motion(coefficients)
+        _, slopes = self.limits.evaluate(motion, shifts=self._shifts(motion))
         samples, r, states = slopes.shape
         by_state = slopes.reshape(samples, r, 3, states // 3)
         rows = np.einsum("mrdn,dmw->rmnw", by_state, self.bases, optimize=True)

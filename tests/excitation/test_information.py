@@ -99,8 +99,8 @@ def test_gradient_of_every_criterion(robot_of, criterion):
 def test_gradient_of_log_det_by_inverse_dynamics(robot_of, name):
     """An independent method: RNEA is linear in the inertial parameters.
 
-    tr(W' dPhi) is the derivative of torques of bodies whose ten parameters are rows of W. An offset of a unit mass keeps
-    their centres of mass finite; its own derivative is taken off again.
+    tr(W' dPhi) is the derivative of torques of bodies whose ten parameters are rows of W. An offset of a unit mass
+    keeps their centres of mass finite; its own derivative is taken off again.
     """
     robot = robot_of(name)
     information, criterion = problem(robot, RigidBodies.instances(robot), harmonics=2, samples=30)
