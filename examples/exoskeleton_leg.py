@@ -141,7 +141,8 @@ figure.tight_layout()
 
 # %% [markdown]
 # As in the paper's Figure 3, motors (solid) follow the plan (black), and links (dashed) deviate from it by the
-# deflection of the springs. It is large at the hip, which carries the whole leg, and tiny at the ankle, which carries a foot.
+# deflection of the springs. It is large at the hip, which carries the whole leg, and tiny at the ankle, which carries a
+# foot.
 
 # %%
 planned = excitation.series.evaluate(processed.motion.time)
@@ -199,8 +200,8 @@ print(f"rms of error / standard deviation: {np.sqrt(np.mean(errors**2)):.2f}")
 # $$ \tau_\text{spring} = K_1 (\theta - q) + K_3 (\theta - q)^3 + D (\dot\theta - \dot q). $$
 #
 # The paper leaves the ankle out: the light foot hardly deflects its spring. Here that shows in the standard deviations
-# and in the verdict: pieces of the period are held out, and the cubic term stays only if it predicts them better. At the
-# ankle it does not, and its standard deviation says that the deflection is too small to tell.
+# and in the verdict: pieces of the period are held out, and the cubic term stays only if it predicts them better. At
+# the ankle it does not, and its standard deviation says that the deflection is too small to tell.
 
 # %%
 for spring in model.springs:
