@@ -341,11 +341,11 @@ def read_diagnosis(path: str | Path) -> Diagnosis:
     """
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ModelFileError(f"{path}: the diagnosis cannot be read: {error}") from error
     try:
         return _from_dict(record)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise ModelFileError(f"{path}: not a diagnosis ({type(error).__name__}: {error})") from error
 
 

@@ -138,7 +138,7 @@ def read_model(path: str | Path) -> Model:
         record = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ModelFileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ModelFileError(f"{path}: is not JSON: {error}; is it a MODEL.json, whole?") from None
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise ModelFileError(f"{path}: is not a model of sea_ident; identify writes one")
@@ -152,7 +152,7 @@ def read_model(path: str | Path) -> Model:
         raise ModelFileError(f"{path}: {error}") from None
     except KeyError as error:
         raise ModelFileError(f"{path}: {error} is missing; the file is damaged or was edited") from None
-    except (TypeError, ValueError, AttributeError, IndexError) as error:
+    except (TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise ModelFileError(f"{path}: an entry is malformed: {error}; the file is damaged or was edited") from None
     except SeaIdentError as error:
         raise ModelFileError(f"{path}: {error}") from None
@@ -274,10 +274,13 @@ def _spring_to_dict(spring: SpringResult) -> dict[str, Any]:
 
 
 def _spring_from_dict(entry: Mapping[str, Any]) -> SpringResult:
-    plain = {k: v for k, v in entry.items() if k not in ("law", "verdict", "covariance", "degrees_of_freedom")}
+    other = ("law", "verdict", "covariance", "degrees_of_freedom", "joint", "note", "held_out")
     freedom = entry["degrees_of_freedom"]
     return SpringResult(
-        **plain,
+        **{key: float(value) for key, value in entry.items() if key not in other},
+        joint=str(entry["joint"]),
+        note=str(entry["note"]),
+        held_out={str(key): float(value) for key, value in entry["held_out"].items()},
         verdict=Verdict(entry["verdict"]),
         covariance=tuple(tuple(float(v) for v in row) for row in entry["covariance"]),
         degrees_of_freedom=math.inf if freedom is None else float(freedom),

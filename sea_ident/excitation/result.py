@@ -154,7 +154,7 @@ def read_excitation(path: str | Path) -> Excitation:
     """
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ExcitationError(f"{path}: cannot be read as an excitation: {error}") from None
     if not isinstance(record, Mapping) or record.get("format") != FORMAT:
         raise ExcitationError(f"{path}: is not an excitation; write one with design_excitation(...).save(path)")
@@ -162,7 +162,7 @@ def read_excitation(path: str | Path) -> Excitation:
         raise ExcitationError(f"{path}: has version {record.get('version')!r}; this program reads version {VERSION}")
     try:
         return _from_record(record, path)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise ExcitationError(f"{path}: the excitation is damaged: {type(error).__name__}: {error}") from None
 
 
