@@ -5,7 +5,7 @@ inside all limits at once, each taken on a dense grid of times (linear limits co
 criterion decides how far to go. What a limit does between the grid points is taken off it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ _BOUNDARY = 0.95
 _SMALLEST = 1e-8
 _OPEN = 1e6  # stands for a side without limit
 _INNER = 12
+_FAR = 0.25  # of the room at rest: a nonlinear wall with more slack takes no part in a step
 _INSET = 1e-6  # of the room between rest and limit: kept free
 
 
@@ -34,6 +35,7 @@ class Side:
         beyond: (r, M) what the value does between the grid points.
         slack: (r, M) distance.
         force: (r, M) multipliers.
+        room: (r, 1) slack of the trajectory at rest.
     """
 
     wall: int
@@ -42,12 +44,13 @@ class Side:
     beyond: FloatArray
     slack: FloatArray
     force: FloatArray
+    room: FloatArray
 
 
 def model_step(
     gradient: FloatArray,
     curvature: FloatArray,
-    tangents: Sequence[Tangent],
+    tangents: Mapping[int, Tangent],
     sides: Sequence[Side],
     barrier: float,
     shape: tuple[int, int],
@@ -57,7 +60,7 @@ def model_step(
     Args:
         gradient: (v,).
         curvature: (v, v), positive definite.
-        tangents: the walls.
+        tangents: the walls that are near, by index.
         sides: their slacks and multipliers.
         barrier: weight of the barrier to begin with.
         shape: of the coefficients.
@@ -66,21 +69,26 @@ def model_step(
         (v,) step, multipliers after it, and the weight of the barrier reached.
     """
     step = np.zeros(len(gradient))
+    far = [side.wall not in tangents for side in sides]
     slacks = [side.slack for side in sides]
     forces = [side.force for side in sides]
     for _ in range(_INNER):
         pushed = gradient - curvature @ step
         walled = curvature.copy()
-        for k, tangent in enumerate(tangents):
+        for k, tangent in tangents.items():
             here = [j for j, side in enumerate(sides) if side.wall == k]
             pushed -= tangent.pull(np.sum([sides[j].sign * barrier / slacks[j] for j in here], axis=0))
             walled += tangent.curvature(np.sum([forces[j] / slacks[j] for j in here], axis=0))
         change = scipy.linalg.solve(walled, pushed, assume_a="pos", check_finite=False)
-        moved = [tangent.push(change.reshape(shape)) for tangent in tangents]
-        closings = [side.sign * moved[side.wall] for side in sides]
-        length = min(_fraction(slack, closing) for slack, closing in zip(slacks, closings, strict=True))
+        moved = {k: tangent.push(change.reshape(shape)) for k, tangent in tangents.items()}
+        closings = [None if away else side.sign * moved[side.wall] for side, away in zip(sides, far, strict=True)]
+        length = min(
+            _fraction(slack, close) for slack, close in zip(slacks, closings, strict=True) if close is not None
+        )
         step = step + length * change
         for j, closing in enumerate(closings):
+            if closing is None:
+                continue
             force = barrier / slacks[j] * (1.0 + closing * forces[j] / barrier)
             slacks[j] = slacks[j] - length * closing
             forces[j] = np.clip(force, 0.3 * barrier / slacks[j], 30.0 * barrier / slacks[j])
@@ -130,7 +138,7 @@ def raise_inside(
     damping, small = 1e-3, 0
     for _ in range(iterations):
         gradient, curvature = quadratic_model(information, criterion, point)
-        tangents = [wall.tangent(point) for wall in walls]
+        tangents = {k: wall.tangent(point) for k, wall in enumerate(walls) if _near(sides, k)}
         diagonal = np.diag(curvature).copy()
         found = -np.inf
         while found <= value:
@@ -187,7 +195,7 @@ def place_inside(
         The trajectory and its slacks, or None where it would have to shrink by more than half.
     """
     factor = 1.0
-    for _ in range(4):
+    for _ in range(8):
         trial = centre + factor * (coefficients - centre)
         sides: list[Side] = []
         worst = 1.0
@@ -200,15 +208,24 @@ def place_inside(
                 room = sign * (finite - middle[k][:, :1])
                 tight = slack < _INSET * room
                 if np.any(tight):
-                    room = np.broadcast_to(room, slack.shape)[tight]
-                    worst = min(worst, float((room / (room - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
-                sides.append(Side(k, sign, finite, beyond, slack, slack))
+                    there = np.broadcast_to(room, slack.shape)[tight]
+                    worst = min(worst, float((there / (there - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
+                sides.append(Side(k, sign, finite, beyond, slack, slack, room))
+            if worst < 1.0:  # the costlier walls come later
+                break
         if worst >= 1.0:
             return trial, sides
         factor *= worst
         if factor < 0.5:
             return None
     return None
+
+
+def _near(sides: Sequence[Side], wall: int) -> bool:
+    """Whether a wall is near enough to take part in a step; the first one, of linear limits, always is."""
+    if wall == 0:
+        return True
+    return any(bool(np.any(side.slack < _FAR * side.room)) for side in sides if side.wall == wall)
 
 
 def _fraction(slack: FloatArray, closing: FloatArray) -> float:

@@ -6,6 +6,7 @@ from threading import Event, Lock
 
 import numpy as np
 from joblib import Parallel, delayed
+from joblib.parallel import get_active_backend
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import ExcitationError
@@ -94,54 +95,34 @@ def climb_from_starts(
         starts: number of random starts.
         seed: of the random numbers; start k draws from a stream of its own.
         given: (n, 2 L + 1) a further start.
-        jobs: threads.
+        jobs: at the same time; threads, unless `joblib.parallel_config` names another backend.
         progress: called after every step.
 
     Returns:
         The best trajectory.
     """
     board = _Board(starts, progress)
-    harmonics = problem.harmonics
     count = starts + (given is not None)
-
-    def scout(start: int) -> float:
-        generator = np.random.default_rng([seed, start])
-        for draw in range(_DRAWS):
-            point = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
-            if start >= starts and given is not None:
-                # limits are convex: what lies between two trajectories inside is inside too
-                share = draw / (_DRAWS - 1)
-                point = share * point + (1.0 - share) * repair(
-                    problem.limits, problem.base_frequency, problem.centre, given
-                )
-            point = _loosen(problem, point)
-            information = problem.coarse(_SCOUT_SAMPLES * harmonics, 0.3 * _speed(problem, point))
-            if np.isfinite(problem.value(information, point)):
-                break
-        else:
-            raise ExcitationError(_singular(problem, information, point))
-        board.latest[start] = point
-        # log det is the smoothest way to where all parameters are seen, whatever is asked for in the end; but its
-        # optimum need not be near that of another criterion: every other start goes straight for that
-        criterion = problem.criterion if start % 2 else DOptimality()
-        _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, 30.0 * criterion.tolerance)
-        return problem.value(information, board.latest[start])
-
-    def climb(start: int) -> None:
-        point = board.latest[start]
-        samples = min(problem.fine.sampling.samples, _CLIMB_SAMPLES * harmonics)
-        spacing = 1.0 / (problem.base_frequency * samples)
-        information = problem.coarse(samples, 0.5 * spacing * _speed(problem, point, derivative=2))
-        criterion = problem.criterion
-        _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, criterion.tolerance)
 
     interrupted = False
     try:
-        parallel = Parallel(n_jobs=min(jobs, count), backend="threading")
-        scouted = parallel(delayed(scout)(start) for start in range(count))
-        order = np.argsort(-np.array(scouted), kind="stable")[: max(1, -(-count // 3))]
+        parallel = Parallel(n_jobs=min(jobs, count), prefer="threads")
+        # whoever chose another backend, such as a cluster, has it: its workers share no memory with this process
+        shared = bool(get_active_backend(prefer="threads")[0].supports_sharedmem)
+        if shared:
+            scouted = parallel(delayed(_scout)(problem, board, seed, given, start) for start in range(count))
+        else:
+            far = parallel(delayed(_scout_apart)(problem, starts, seed, given, start) for start in range(count))
+            scouted = [value for value, _ in far]
+            for start, (value, point) in enumerate(far):
+                board.note(start, value, point)
+        order = [int(k) for k in np.argsort(-np.array(scouted), kind="stable")[: max(1, -(-count // 3))]]
         board.best = -np.inf
-        parallel(delayed(climb)(int(start)) for start in order)
+        if shared:
+            parallel(delayed(_climb)(problem, board, start) for start in order)
+        else:
+            points = parallel(delayed(_climb_apart)(problem, starts, start, board.latest[start]) for start in order)
+            board.latest.update(zip(order, points, strict=True))
     except KeyboardInterrupt:
         board.stop.set()
         if not board.latest:
@@ -151,6 +132,56 @@ def climb_from_starts(
     values = {start: problem.value(problem.fine, point) for start, point in settled.items()}
     best = max(values, key=lambda start: values[start])
     return Found(settled[best], tuple(values.values()), interrupted)
+
+
+def _scout(problem: Problem, board: _Board, seed: int, given: FloatArray | None, start: int) -> float:
+    """Draw a start and climb a little."""
+    generator = np.random.default_rng([seed, start])
+    for draw in range(_DRAWS):
+        point = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
+        if start >= board.starts and given is not None:
+            # limits are convex: what lies between two trajectories inside is inside too
+            share = draw / (_DRAWS - 1)
+            point = share * point + (1.0 - share) * repair(
+                problem.limits, problem.base_frequency, problem.centre, given
+            )
+        point = _loosen(problem, point)
+        information = problem.coarse(_SCOUT_SAMPLES * problem.harmonics, 0.3 * _speed(problem, point))
+        if np.isfinite(problem.value(information, point)):
+            break
+    else:
+        raise ExcitationError(_singular(problem, information, point))
+    board.latest[start] = point
+    # log det is the smoothest way to where all parameters are seen, whatever is asked for in the end; but its
+    # optimum need not be near that of another criterion: every other start goes straight for that
+    criterion = problem.criterion if start % 2 else DOptimality()
+    _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, 30.0 * criterion.tolerance)
+    return problem.value(information, board.latest[start])
+
+
+def _climb(problem: Problem, board: _Board, start: int) -> None:
+    """Climb to the end."""
+    point = board.latest[start]
+    samples = min(problem.fine.sampling.samples, _CLIMB_SAMPLES * problem.harmonics)
+    spacing = 1.0 / (problem.base_frequency * samples)
+    information = problem.coarse(samples, 0.5 * spacing * _speed(problem, point, derivative=2))
+    criterion = problem.criterion
+    _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, criterion.tolerance)
+
+
+def _scout_apart(
+    problem: Problem, starts: int, seed: int, given: FloatArray | None, start: int
+) -> tuple[float, FloatArray]:
+    """The same in another process, which does not see the board of this one."""
+    board = _Board(starts, None)
+    return _scout(problem, board, seed, given, start), board.latest[start]
+
+
+def _climb_apart(problem: Problem, starts: int, start: int, point: FloatArray) -> FloatArray:
+    """The same in another process."""
+    board = _Board(starts, None, latest={start: point})
+    _climb(problem, board, start)
+    return board.latest[start]
 
 
 def _raise(
