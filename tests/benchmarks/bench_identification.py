@@ -1,0 +1,146 @@
+"""Do the intervals hold the truth, is the estimate unbiased, and what is weighting by sample worth?
+
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--jobs 2]
+
+Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with and without friction that
+varies from pass to pass. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
+95 % interval. For the weightings: mean squared error relative to one variance per joint, and rms of the torque error
+on a gait that was not used. Seeds share simulated passes (see experiments.py): the mean friction of a pool of M passes
+is itself off by sqrt(20 / M) of what 20 passes scatter, 0.14 for 1000, which shows as bias.
+"""
+
+import argparse
+import time
+import warnings
+
+import numpy as np
+from experiments import Pool, Sensors, cached_pool, draw
+from joblib import Parallel, delayed
+
+from sea_ident.base_parameters import find_base_parameters
+from sea_ident.effects import base_effects
+from sea_ident.estimation import (
+    InstrumentalVariables,
+    JointWLS,
+    LeastSquares,
+    Observations,
+    PerSampleWLS,
+    identify_one_shot,
+)
+from sea_ident.estimation.observations import base_rows
+from sea_ident.estimation.springs import springs_from
+from sea_ident.estimation.uncertainty import honest_uncertainty
+from sea_ident.motion import FourierSeries, Motion
+from sea_ident.processing import process
+from sea_ident.simulation import FrictionJitter
+
+ESTIMATORS = {
+    "least squares": LeastSquares(),
+    "one variance per joint": JointWLS(),
+    "per sample, raw": PerSampleWLS(smoothing=0.0),
+    "per sample, smoothed": PerSampleWLS(),
+    "default": InstrumentalVariables(),
+}
+
+
+def gait(robot) -> Motion:
+    """A step of about a second and a half, as a Fourier series; links and motors together."""
+    series = FourierSeries(
+        0.7,
+        np.array([0.35, -0.25, 0.1]),
+        np.array([[0.9, 0.15, 0.0], [0.5, -0.6, 0.1], [0.4, 0.3, -0.2]]),
+        np.array([[0.1, 0.2, 0.0], [-0.4, 0.3, 0.1], [0.3, -0.5, 0.1]]),
+    )
+    return series.sample(samples=400)
+
+
+def one_seed(pool: Pool, seed: int, sensors: Sensors, springs: bool) -> dict[str, tuple[np.ndarray, ...]]:
+    """Per estimator: error, standard deviation and half width of every parameter."""
+    warnings.simplefilter("ignore")
+    robot = pool.robot
+    effects = base_effects(robot)
+    base = find_base_parameters(robot, effects)
+    exact = base.project(pool.truth)
+    processed = process(draw(pool, seed, 20, sensors), robot, period=10.0)
+    observations = Observations(robot, effects, base, processed)
+    found = {}
+    for name, estimator in ESTIMATORS.items():
+        estimate = estimator.estimate(observations)
+        uncertainty = honest_uncertainty(observations, estimate)
+        error, std, half = estimate.values - exact, uncertainty.std, uncertainty.half_width()
+        if springs and name == "default":
+            laws = springs_from(observations, estimate.values, uncertainty)
+            error, std, half = joined(error, std, half, laws, pool)
+        found[name] = (error, std, half)
+    if springs:
+        model = identify_one_shot(robot, processed)
+        parts = (model.values - exact, model.std, model.uncertainty.half_width())
+        found["one shot"] = joined(*parts, model.springs, pool)
+    return found
+
+
+def joined(error, std, half, laws, pool):
+    values = np.ravel([[s.stiffness, s.cubic_stiffness, s.damping] for s in laws])
+    spread = np.ravel([[s.stiffness_std, s.cubic_stiffness_std, s.damping_std] for s in laws])
+    width = np.ravel([s.half_width() for s in laws])
+    return np.r_[error, values - pool.springs()], np.r_[std, spread], np.r_[half, width]
+
+
+def table(title: str, names: list[str], results: list[dict]) -> None:
+    print(f"\n{title}: {len(results)} seeds")
+    for label in results[0]:
+        error, std, half = (np.array([r[label][k] for r in results]) for k in range(3))
+        true = error.std(axis=0)
+        inside = (np.abs(error) <= half).mean(axis=0)
+        print(f"\n  {label}: coverage {100 * inside.mean():.1f} % over all")
+        for k in range(error.shape[1]):
+            bias = error[:, k].mean() / true[k]
+            print(
+                f"    {names[k]:<26} bias {bias:+.2f}  stated/true std {np.sqrt((std[:, k] ** 2).mean()) / true[k]:.2f}"
+                f"  coverage {100 * inside[k]:5.1f} %"
+            )
+
+
+def weightings(pool: Pool, results: list[dict]) -> None:
+    robot = pool.robot
+    effects = base_effects(robot)
+    base = find_base_parameters(robot, effects)
+    rows = base_rows(robot, effects, base, gait(robot))
+    count = base.rank
+    errors = {label: np.array([r[label][0][:count] for r in results]) for label in ESTIMATORS}
+    reference = (errors["one variance per joint"] ** 2).mean(axis=0)
+    print(
+        "\n  estimator                mean squared error / one variance per joint    rms torque error on a gait [N m]"
+    )
+    for label, error in errors.items():
+        ratio = (error**2).mean(axis=0) / reference
+        torque = np.sqrt(np.mean([(rows @ e) ** 2 for e in error], axis=(0, 1)))
+        joints = "  ".join(f"{name} {value:.4f}" for name, value in zip(robot.joint_names, torque, strict=True))
+        print(f"  {label:<24} {np.exp(np.log(ratio).mean()):.3f} (worst parameter {ratio.max():.2f})    {joints}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--passes", type=int, default=1000)
+    parser.add_argument("--jobs", type=int, default=2)
+    arguments = parser.parse_args()
+    for title, name, passes, settings in (
+        ("friction varies from pass to pass", "jitter", arguments.passes, {}),
+        ("every pass alike", "steady", 40, {"jitter": FrictionJitter.none()}),
+    ):
+        begin = time.perf_counter()
+        pool = cached_pool(name, passes, 1, **settings)
+        base = find_base_parameters(pool.robot, base_effects(pool.robot))
+        names = [*base.names, *(f"{j} {k}" for j in pool.robot.joint_names for k in ("K1", "K3", "D"))]
+        run = delayed(one_seed)
+        results = Parallel(arguments.jobs)(
+            run(pool, seed, Sensors(), name == "jitter") for seed in range(arguments.seeds)
+        )
+        table(title, names, results)
+        weightings(pool, results)
+        print(f"\n  {time.perf_counter() - begin:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
