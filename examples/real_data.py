@@ -106,7 +106,7 @@ if path:
 
 # %% [markdown]
 # What is left is not noise: it peaks where the carriage turns round. A sign function is a crude model of friction near
-# zero speed, and every published analysis of this axis shows the same spikes.
+# zero speed.
 #
 # ## 2. The flexible link
 #
@@ -125,9 +125,11 @@ if path:
 # The warnings are the result here. The residual is several times the noise: the model lacks something. Inertias and a
 # stiffness come out negative, which no machine has, and the intervals are wide: with two periods only, and a model that
 # does not hold, they have to be. The maker's nominal stiffnesses are 39.96 and 6.858 N m/rad; these data neither
-# confirm nor refute them in this way, and the verdict on both springs is that they are not excited enough. A likely
-# reading is that a distributed flexible beam is not a spring between two rigid bodies, and that a square wave excites
-# just what such a model leaves out. The recording cannot decide that. What can be shown is where model and data part.
+# confirm nor refute them in this way, and the verdict on both springs is that they are not excited enough.
+#
+# The figure shows where model and data part. Where the motors rest, they hold a torque that the model does not
+# predict: the Coulomb term is smoothed to zero there, while real friction can hold any torque up to its bound. And the
+# measured torque swings on while the beams ring. What the cause is, this recording cannot decide.
 
 # %%
 if path:
@@ -178,8 +180,8 @@ if path:
 
 # %% [markdown]
 # The two encoders of the log itself have different zeros, so the offset between them is one more unknown, and they are
-# too coarse to see the deflection: most of the torque channel stays unexplained, and no stiffness should be read from
-# this.
+# too coarse to see the deflection well: more than half of the torque channel stays unexplained, and no stiffness should
+# be read from this.
 
 # %%
 if path:
@@ -187,6 +189,6 @@ if path:
     print(f"unexplained: {spring.rms_residual:.3f} of {spring.rms_torque:.3f} N m (rms)")
     deflection = recording.columns["theta_output"] - recording.columns["q_output"]
     figure, axes = plt.subplots(figsize=(6, 4))
-    axes.plot(deflection - deflection.mean(), recording.columns["tau_spring_output"], ".", markersize=3)
-    axes.set(xlabel="theta - q, less its mean [rad]", ylabel="torque channel [N m]")
+    axes.plot(1e3 * (deflection - deflection.mean()), recording.columns["tau_spring_output"], ".", markersize=3)
+    axes.set(xlabel="theta - q, less its mean [mrad]", ylabel="torque channel [N m]")
     figure.tight_layout()
