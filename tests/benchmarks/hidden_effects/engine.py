@@ -244,19 +244,18 @@ def simulate_mujoco(
             if h.bristle is not None:
                 f = h.bristle(s, level)
             elif level > 0.0:
-                ahead = v[it[i]] / gear[i] + step * (free / m - coupling[i]) + carried
-                f = ahead / ((0.0 if h.sticks else smoothing) / level + step / m)
-                if f > level:
-                    f = level
-                elif f < -level:
-                    f = -level
-                if not (ramp or h.sticks):
-                    w = ahead - step * f / m
+                sharp = ramp or h.sticks
+                # what sticks is solved for at the end of the step, what is smooth in its middle
+                ahead_by = step if sharp else half
+                ahead = v[it[i]] / gear[i] + ahead_by * (free / m - coupling[i]) + carried
+                f = ahead / ((0.0 if h.sticks else smoothing) / level + ahead_by / m)
+                f = level if f > level else -level if f < -level else f
+                if not sharp:
+                    w = ahead - half * f / m
+                    stiffness = half * level / m
                     for _ in range(4):
                         bend = tanh(w / smoothing)
-                        w -= (w + step * level / m * bend - ahead) / (
-                            1.0 + step * level / (m * smoothing) * (1.0 - bend * bend)
-                        )
+                        w -= (w + stiffness * bend - ahead) / (1.0 + stiffness / smoothing * (1.0 - bend * bend))
                     f = level * tanh(w / smoothing)
             else:
                 f = 0.0
