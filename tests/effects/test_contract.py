@@ -1,0 +1,202 @@
+"""What holds for every effect, whoever wrote it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.base_parameters import random_motion
+from sea_ident.effects import (
+    Anchor,
+    JointEffect,
+    SimulationState,
+    State,
+    base_effects,
+    effect_classes,
+    effect_from_dict,
+    make_effect,
+    spring_effects,
+)
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.exceptions import EffectError
+from sea_ident.regressor import model_columns, prior_parameters
+from sea_ident.robot import load_robot
+
+NAMES = [
+    "stribeck_friction",
+    "nonlinear_viscous_friction",
+    "presliding_friction",
+    "load_dependent_friction",
+    "directional_efficiency",
+    "position_dependent_friction",
+    "torque_ripple",
+    "torque_offset",
+    "torque_saturation",
+    "torque_constant",
+    "spring_stiffening",
+    "asymmetric_spring",
+    "spring_hysteresis",
+    "backlash",
+    "spring_offset",
+    "link_friction",
+    "parallel_spring",
+    "base_tilt",
+    "link_flexibility",
+    "rotor_coupling",
+    "transmission_coupling",
+    "encoder_offset",
+    "encoder_eccentricity",
+    "position_delay",
+    "torque_delay",
+    "friction_drift",
+    "torque_constant_drift",
+    "stiffness_drift",
+    "temperature_friction",
+    "payload",
+    "external_force",
+]
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return load_robot("exo_leg")
+
+
+def anchored(effect, robot):
+    effects = (*base_effects(robot), *spring_effects(robot))
+    names = [column.name for column in model_columns(robot, effects)]
+    parameters = dict(zip(names, np.nan_to_num(prior_parameters(robot, effects)), strict=True))
+    return effect.anchored(Anchor(robot, effects, parameters))
+
+
+def everywhere(robot):
+    for name, cls in effect_classes().items():
+        for effect in cls.instances(robot)[:2]:
+            yield name, effect
+
+
+def smooth_motion(robot):
+    """A periodic motion with temperature, as effects with memory and drifts need it."""
+    time = np.arange(400) / 100.0
+    phase = 2.0 * np.pi * time / 4.0
+    motion = random_motion(robot, len(time), 1)
+    amplitude = np.array([0.2, 0.15, 0.3])[: robot.n]
+    q = np.sin(phase)[:, None] * amplitude + 0.3
+    dq = np.cos(phase)[:, None] * amplitude * np.pi / 2.0
+    ddq = -np.sin(phase)[:, None] * amplitude * (np.pi / 2.0) ** 2
+    return type(motion)(
+        time, q, dq, ddq, q + 0.05 * np.sin(phase)[:, None], dq + 0.05 * np.pi / 2 * np.cos(phase)[:, None], ddq
+    )
+
+
+def test_the_library_holds_every_effect():
+    assert set(NAMES) <= set(effect_classes())
+
+
+@pytest.mark.parametrize("name", sorted(effect_classes()))
+def test_columns_match_what_is_computed(name, leg):
+    cls = effect_classes()[name]
+    assert cls.name == name
+    assert cls.source
+    motion = smooth_motion(leg)
+    channels = {"temperature": np.full((len(motion), leg.n), 30.0), "tau_spring": 100.0 * motion.deflection}
+    for effect in cls.instances(leg)[:2]:
+        ready = anchored(effect, leg)
+        columns = ready.columns(leg)
+        rows = ready.evaluate(State(leg, motion, channels))
+        assert columns or isinstance(effect, SignalEffect) or hasattr(effect, "amounts")
+        assert len({c.name for c in columns}) == len(columns)
+        assert all(c.effect == name and c.unit for c in columns)
+        assert rows.link.shape == rows.motor.shape == (len(motion), leg.n, len(columns))
+        assert np.all(np.isfinite(rows.link))
+        assert np.all(np.isfinite(rows.motor))
+
+
+@pytest.mark.parametrize("name", sorted(effect_classes()))
+def test_an_effect_survives_json(name, leg):
+    for effect in effect_classes()[name].instances(leg)[:2]:
+        again = effect_from_dict(json.loads(json.dumps(effect.to_dict())))
+        assert type(again) is type(effect)
+        assert again.joint == effect.joint
+        assert again.shape_values == effect.shape_values
+
+
+@pytest.mark.parametrize("name", sorted(effect_classes()))
+def test_shapes_lie_inside_their_ranges(name, leg):
+    for effect in effect_classes()[name].instances(leg)[:1]:
+        for shape in effect.shapes:
+            assert shape.lower <= getattr(effect, shape.name) <= shape.upper
+            grid = shape.grid()
+            assert grid.min() >= shape.lower * (1 - 1e-12)
+            assert grid.max() <= shape.upper * (1 + 1e-12)
+
+
+def test_the_torque_in_a_simulation_is_that_of_the_columns(leg):
+    """A friction with the wrong sign, or a spring that pushes the wrong body, would fail here."""
+    motion = random_motion(leg, 30, 2)
+    rng = np.random.default_rng(3)
+    checked, nothing = 0, np.zeros(leg.n)
+    for _, effect in everywhere(leg):
+        if not isinstance(effect, JointEffect) or effect.name == "temperature_friction":  # warms by itself
+            continue
+        values = rng.uniform(0.5, 2.0, len(effect.columns(leg)))
+        rows = effect.evaluate(State(leg, motion, {"temperature": np.zeros((len(motion), leg.n))}))
+        action = effect.torque(leg, values)
+        if hasattr(action, "accept"):
+            continue
+        for k in range(len(motion)):
+            link, motor = np.zeros(leg.n), np.zeros(leg.n)
+            action(
+                SimulationState(
+                    motion.time[k], motion.q[k], motion.dq[k], motion.theta[k], motion.dtheta[k], nothing, nothing
+                ),
+                link,
+                motor,
+            )
+            np.testing.assert_allclose(link, rows.link[k] @ values, atol=1e-12)
+            np.testing.assert_allclose(motor, rows.motor[k] @ values, atol=1e-12)
+        checked += 1
+    assert checked > 10
+
+
+@pytest.mark.parametrize("name", ["encoder_offset", "encoder_eccentricity", "position_delay", "torque_delay"])
+def test_a_sensor_effect_changes_what_is_seen_and_can_be_taken_out(name, leg):
+    motion = smooth_motion(leg)
+    signals = {"q": motion.q, "theta": motion.theta, "tau_motor": motion.q, "tau_spring": motion.q}
+    effect = make_effect(name, "knee")
+    nothing = {amount.name: 0.0 for amount in effect.amounts}
+    something = {amount.name: 0.01 for amount in effect.amounts}
+    seen = replace(effect, **nothing).measured(leg, motion.time, signals)
+    assert all(np.array_equal(seen[kind], signals[kind]) for kind in signals)
+    seen = replace(effect, **something).measured(leg, motion.time, signals)
+    changed = {kind for kind in signals if not np.allclose(seen[kind], signals[kind], atol=1e-6)}
+    assert changed
+    assert all(np.array_equal(seen[kind][:, 0], signals[kind][:, 0]) for kind in signals)
+    if "q" in changed:
+        shown = replace(motion, q=seen["q"], theta=seen["theta"])
+        again = replace(effect, **something).corrected(leg, shown)
+        np.testing.assert_allclose(again.q[20:-20], motion.q[20:-20], atol=2e-4)
+
+
+def test_a_spring_effect_cancels_in_the_sum(leg):
+    motion = smooth_motion(leg)
+    for name in ("spring_stiffness", "spring_stiffening", "asymmetric_spring", "spring_offset", "spring_hysteresis"):
+        rows = anchored(make_effect(name, "knee"), leg).evaluate(State(leg, motion))
+        np.testing.assert_allclose(rows.link + rows.motor, 0.0, atol=1e-12)
+        assert np.abs(rows.motor).max() > 0.0
+
+
+def test_an_unknown_joint_is_told(leg):
+    with pytest.raises(Exception, match="its joints are hip, knee, ankle"):
+        make_effect("stribeck_friction", "elbow").columns(leg)
+
+
+def test_an_unknown_effect_lists_what_exists():
+    with pytest.raises(EffectError, match="stribeck_friction"):
+        make_effect("stribek")
+
+
+def test_an_unknown_shape_is_told():
+    with pytest.raises(EffectError, match="colour"):
+        make_effect("stribeck_friction", "knee", colour=1.0)
