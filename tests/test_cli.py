@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+DATA = Path(__file__).parents[1] / ".." / "shared" / "data"
+
 
 def call(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", "from sea_ident.cli import main; main()", *map(str, arguments)]
@@ -155,8 +157,11 @@ def test_identify_finds_the_leg_that_was_simulated(chain):
 def test_identify_adds_the_effects_asked_for(chain, tmp_path):
     record = call_json(
         "identify", "exo_leg", chain[0] / "rec.csv", "--period", 5, "--out", tmp_path / "model.json",
-        "--add", "torque_offset:knee", "--add", "torque_offset:hip",
+        "--add", "torque_offset:knee", "--add", "torque_offset:hip", "--add", "coulomb_friction:hip,smoothing=0.02",
     )  # fmt: skip
+    friction = {e["joint"]: e["shape"] for e in record["effects"] if e["effect"] == "coulomb_friction"}
+    assert friction["hip"]["smoothing"] == 0.02
+    assert friction["knee"]["smoothing"] == 0.01
     offsets = {p["joint"]: p for p in record["parameters"] if p["effect"] == "torque_offset"}
     assert set(offsets) == {"knee", "hip"}
     assert all(abs(p["value"]) < 6 * p["std"] for p in offsets.values())
@@ -192,6 +197,8 @@ def test_a_report_needs_the_model_file_only(chain):
         (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--report", "never.json"), "two outputs"),
         (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--add", "no_such_effect"), "torque_offset"),
         (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--add", "torque_offset:elbow"), "elbow"),
+        (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--add", "coulomb_friction,smoothing=x"), "NUMBER"),
+        (("identify", "exo_leg", "rec.csv", "--out", "never.json", "--add", "coulomb_friction,sharp=1"), "sharp"),
         (("simulate", "exo_leg", "--excitation", "model.json", "--out", "never.csv"), "not an excitation"),
         (("excite", "exo_leg", "--out", "never.json", "--harmonics", "0"), "harmonics"),
         (("validate", "exc.json", "rec.csv"), "exc.json"),
@@ -246,3 +253,17 @@ def test_completion_is_offered_for_shells(shell):
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert "sea-ident" in done.stdout
     assert "_SEA_IDENT_COMPLETE" in done.stdout
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="measured recordings are not beside this checkout (../shared/data)")
+def test_the_emps_axis_comes_out_as_published(tmp_path):
+    record = call_json(
+        "identify", "emps", DATA / "emps" / "identification.csv", "--out", tmp_path / "model.json",
+        "--add", "torque_offset", "--add", "coulomb_friction,smoothing=0.001",
+    )  # fmt: skip
+    found = {parameter["name"]: parameter["value"] for parameter in record["base_parameters"]}
+    # Janot, Gautier, Brunot 2019: M, Fv, Fc, offset
+    assert found["carriage.m"] == pytest.approx(95.1089, rel=0.005)
+    assert found["slider.viscous_friction"] == pytest.approx(203.5034, rel=0.02)
+    assert found["slider.coulomb_friction"] == pytest.approx(20.3935, rel=0.02)
+    assert found["slider.torque_offset"] == pytest.approx(-3.1648, rel=0.03)

@@ -26,26 +26,48 @@ def split_names(text: str | None) -> list[str]:
 
 
 def read_effects(robot: "Robot", added: Sequence[str] | None) -> "tuple[Effect, ...]":
-    """Bodies, rotors and friction, and the effects that --add names.
+    """Bodies, rotors and friction, with the effects that --add names in place of their like or beside them.
 
     Raises:
-        EffectError: an effect is not known, or does not fit that joint.
+        EffectError: an effect is not known, does not fit that joint, or has no such shape.
     """
-    from sea_ident.effects import base_effects, effect_classes, make_effect
-    from sea_ident.exceptions import EffectError
+    from sea_ident.effects import base_effects
 
     effects = list(base_effects(robot))
     for text in added or ():
-        name, _, joint = text.partition(":")
-        if joint:
-            robot.index(joint)
-        kind = effect_classes().get(name) or type(make_effect(name))  # which says what there is
-        found = [effect for effect in kind.instances(robot) if not joint or effect.joint == joint]
-        if not found:
-            where = f"joint {joint!r}" if joint else "any joint"
-            raise EffectError(f"the effect {name!r} does not fit {where} of {robot.name}")
-        effects.extend(found)
+        for effect in _effects_of(robot, text):
+            same = [k for k, e in enumerate(effects) if e.name == effect.name and e.joint == effect.joint]
+            if same:
+                effects[same[0]] = effect
+            else:
+                effects.append(effect)
     return tuple(effects)
+
+
+def _effects_of(robot: "Robot", text: str) -> "list[Effect]":
+    """Effects that `EFFECT[:JOINT][,SHAPE=VALUE...]` means."""
+    from sea_ident.effects import effect_classes, make_effect
+    from sea_ident.exceptions import EffectError
+
+    place, *settings = text.split(",")
+    name, _, joint = place.partition(":")
+    if joint:
+        robot.index(joint)
+    kind = effect_classes().get(name) or type(make_effect(name))  # which says what there is
+    shape: dict[str, float] = {}
+    for setting in settings:
+        key, _, value = setting.partition("=")
+        try:
+            shape[key.strip()] = float(value)
+        except ValueError:
+            raise EffectError(f"--add {text}: {setting!r} is not SHAPE=NUMBER") from None
+    found = [effect for effect in kind.instances(robot) if not joint or effect.joint == joint]
+    if not found:
+        where = f"joint {joint!r}" if joint else "any joint"
+        raise EffectError(f"the effect {name!r} does not fit {where} of {robot.name}")
+    return [
+        make_effect(name, effect.joint, **{**effect.shape_values, **shape}) if shape else effect for effect in found
+    ]
 
 
 def read_result(path: Path, model: Path | None) -> "Model | Diagnosis":

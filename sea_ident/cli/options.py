@@ -32,8 +32,9 @@ AddedEffects: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
         "--add",
-        metavar="EFFECT[:JOINT]",
-        help="Effect to add to bodies, rotors and friction, at one joint or all it fits; may be repeated.",
+        metavar="EFFECT[:JOINT][,SHAPE=VALUE]",
+        help="Effect to add to bodies, rotors and friction, at one joint or all it fits, or to take the place of its "
+        "like there; may be repeated.",
     ),
 ]
 UnknownZeros: TypeAlias = Annotated[
