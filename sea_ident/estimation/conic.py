@@ -12,6 +12,9 @@ from sea_ident.exceptions import IdentificationError
 
 SOLVED = ("Solved", "AlmostSolved")
 
+TOLERANCES = (1e-10, 1e-8, 1e-6)
+"""Tried one after the other: close to the border of the cones the tightest may be out of reach."""
+
 
 @dataclass
 class ConicProgram:
@@ -71,21 +74,18 @@ class ConicProgram:
         Raises:
             IdentificationError: if there is none, or it is not found.
         """
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
-        settings.max_iter = 200
-        solver = clarabel.DefaultSolver(
-            sparse.csc_matrix(np.triu(self.hessian)),
-            self.gradient,
-            sparse.csc_matrix(np.vstack(self._rows)),
-            np.concatenate(self._sides),
-            self._cones,
-            settings,
-        )
-        solution = solver.solve()
-        status = str(solution.status)
-        values = np.array(solution.x, dtype=np.float64)
-        if status not in SOLVED and not (status == "InsufficientProgress" and np.all(np.isfinite(values))):
-            raise IdentificationError(f"{what}: the conic solver ends with {status!r}; there may be no solution")
-        return values
+        hessian = sparse.csc_matrix(np.triu(self.hessian))
+        rows, sides = sparse.csc_matrix(np.vstack(self._rows)), np.concatenate(self._sides)
+        status = ""
+        for tolerance in TOLERANCES:
+            settings = clarabel.DefaultSettings()
+            settings.verbose = False
+            settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+            settings.max_iter = 200
+            solution = clarabel.DefaultSolver(hessian, self.gradient, rows, sides, self._cones, settings).solve()
+            status = str(solution.status)
+            values: FloatArray = np.array(solution.x, dtype=np.float64)
+            usable = status in SOLVED or status == "InsufficientProgress"
+            if usable and np.all(np.isfinite(values)):
+                return values
+        raise IdentificationError(f"{what}: the conic solver ends with {status!r}; there may be no solution")

@@ -52,7 +52,8 @@ class PhysicalParameters:
         bodies: bodies that hold the identified values back: what is measured is impossible for them.
         limited: other parameters at their limit of zero.
         model: the identified model with `base_values` in place of the identified ones.
-        pull: what drew the free directions.
+        pull: what drew the free directions; None where real bodies are so tightly held by the data that only the
+            point nearest to the data was found.
     """
 
     columns: tuple[Column, ...]
@@ -64,7 +65,7 @@ class PhysicalParameters:
     bodies: tuple[str, ...]
     limited: tuple[str, ...]
     model: Model
-    pull: Pull
+    pull: Pull | None
 
     @property
     def consistent(self) -> bool:
@@ -163,7 +164,7 @@ def physical_parameters(
     shift = problem.grouping @ nearest - model.values
     std = np.where(model.std > 0.0, model.std, np.maximum(np.abs(model.values), 1e-12) * 1e-6)
     target = model.values if np.all(np.abs(shift / std) < CONSISTENT) else problem.grouping @ nearest
-    values = problem.drawn(target, nearest, pull)
+    values, drawn_by = problem.drawn_or_nearest(target, nearest, pull)
     base_values = problem.grouping @ values
     shift = base_values - model.values
     consistent = bool(np.all(np.abs(shift / std) < CONSISTENT))
@@ -177,7 +178,7 @@ def physical_parameters(
         bodies=() if consistent else problem.holding_back(model, float(shift @ model.information @ shift)),
         limited=() if consistent else problem.limited(values),
         model=replace(model, values=base_values),
-        pull=pull,
+        pull=drawn_by,
     )
 
 
@@ -276,6 +277,15 @@ class _Problem:
         program.gradient = -2.0 * (weight * matrix.T @ side + faint * known)
         self._constrain(program, INTERIOR, without)
         return program.solve("physically possible parameters") * self.scale
+
+    def drawn_or_nearest(self, target: FloatArray, nearest: FloatArray, pull: Pull) -> tuple[FloatArray, Pull | None]:
+        """As `drawn`; by the other distance, or not at all, where the solver does not get through."""
+        for chosen in dict.fromkeys((pull, Pull.EUCLIDEAN)):
+            try:
+                return self.drawn(target, nearest, chosen), chosen
+            except IdentificationError:
+                continue
+        return nearest, None
 
     def drawn(self, target: FloatArray, start: FloatArray, pull: Pull) -> FloatArray:
         """(p,) possible parameters with exactly these base parameters, nearest to the description."""
