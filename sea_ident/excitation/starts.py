@@ -108,7 +108,7 @@ def climb_from_starts(
     try:
         parallel = Parallel(n_jobs=min(jobs, count), prefer="threads")
         # whoever chose another backend, such as a cluster, has it: its workers share no memory with this process
-        shared = bool(get_active_backend(prefer="threads")[0].supports_sharedmem)
+        shared = bool(getattr(get_active_backend(prefer="threads")[0], "supports_sharedmem", False))
         if shared:
             scouted = parallel(delayed(_scout)(problem, board, seed, given, start) for start in range(count))
         else:
