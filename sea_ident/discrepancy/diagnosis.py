@@ -14,6 +14,8 @@ from sea_ident.effects import Effect, effect_from_dict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import ModelFileError
 
+_LARGEST = 1e100  # magnitude beyond which a number was not written by a diagnosis
+
 
 class Verdict(StrEnum):
     """The outcome in a word."""
@@ -274,7 +276,7 @@ class Diagnosis:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of DIAGNOSIS.json."""
-        empty = {"before": {}, "after": {}, "noise": {}}
+        empty: dict[str, Any] = {"before": {}, "after": {}, "noise": {}}
         return {
             "verdict": str(self.verdict),
             "summary": self.text,
@@ -391,25 +393,32 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
         verdict=Verdict(record["verdict"]),
         text=record["summary"],
         lack_of_fit=LackOfFit(
-            lack["statistic"], lack["dof"], lack["p_value"], lack["trend_p_value"], lack["per_joint"],
-            lack.get("remainder", 0.0),
+            _finite(lack["statistic"]), int(lack["dof"]), _finite(lack["p_value"]), _finite(lack["trend_p_value"]),
+            {joint: _numbers(parts) for joint, parts in lack["per_joint"].items()}, _finite(lack.get("remainder", 0.0)),
         ),
-        locations=tuple(Location(**x) for x in record["locations"]),
+        locations=tuple(
+            Location(
+                str(x["joint"]), str(x["equation"]), str(x["regime"]), _finite(x["excess_rms"]), _finite(x["z"])
+            )
+            for x in record["locations"]
+        ),
         missing=tuple(_missing_from_dict(m) for m in record["missing"]),
         training=training if training is not None and training.before else None,
         holdout=_gap_from_dict(gap["holdout"]),
-        simulation_gap={k: Gap(**g) for k, g in record["simulation_gap"].items()},
+        simulation_gap={k: _gap(g) for k, g in record["simulation_gap"].items()},
         detectability=tuple(
             Detectability(
-                d["effect"], d["joint"], float("inf") if d["smallest"] is None else d["smallest"], d["unit"],
-                d["absorbed"], tuple(d["confusable_with"]),
+                d["effect"], d["joint"], float("inf") if d["smallest"] is None else _finite(d["smallest"]), d["unit"],
+                _finite(d["absorbed"]), tuple(str(other) for other in d["confusable_with"]),
             )
             for d in record["detectability"]
         ),
         next_experiment=None
         if after is None
-        else NextExperiment((after["separates"][0], after["separates"][1]), after["excitation"], after["gain"]),
-        warnings=tuple(record["warnings"]),
+        else NextExperiment(
+            (str(after["separates"][0]), str(after["separates"][1])), after["excitation"], _finite(after["gain"])
+        ),
+        warnings=tuple(str(text) for text in record["warnings"]),
         waveforms=None if waves is None else _waveforms_from_dict(waves),
         recording=record.get("recording", ""),
         holdout_source=record.get("holdout"),
@@ -420,18 +429,40 @@ def _missing_from_dict(m: Mapping[str, Any]) -> MissingEffect:
     return MissingEffect(
         effect=m["effect"],
         joint=m["joint"],
-        parameters=tuple(MissingParameter(**p) for p in m["parameters"]),
-        torque_share=m["torque_share"],
-        p_value=m["p_value"],
-        alternatives=tuple(Alternative(**a) for a in m["alternatives"]),
-        transfer=m.get("transfer"),
+        parameters=tuple(
+            MissingParameter(str(p["name"]), _finite(p["value"]), _finite(p["std"]), str(p["unit"]))
+            for p in m["parameters"]
+        ),
+        torque_share=_finite(m["torque_share"]),
+        p_value=_finite(m["p_value"]),
+        alternatives=tuple(Alternative(a["effect"], a["joint"], _finite(a["cos2"])) for a in m["alternatives"]),
+        transfer=None if m.get("transfer") is None else _finite(m["transfer"]),
         detail=None if m.get("detail") is None else effect_from_dict(m["detail"]),
-        values=tuple(m.get("values", ())),
+        values=tuple(_finite(value) for value in m.get("values", ())),
     )
 
 
+def _finite(value: Any) -> float:
+    """A number that can be reckoned with."""
+    number = float(value)
+    if not abs(number) < _LARGEST:
+        raise ValueError(f"{value} is not a number of a diagnosis")
+    return number
+
+
+def _numbers(record: Mapping[str, Any]) -> dict[str, float]:
+    return {str(key): _finite(value) for key, value in record.items()}
+
+
 def _gap_from_dict(record: Mapping[str, Any] | None) -> Gap | None:
-    return None if record is None else Gap(record["before"], record["after"], record["noise"])
+    return None if record is None else _gap(record)
+
+
+def _gap(record: Mapping[str, Any]) -> Gap:
+    before, after, noise = (_numbers(record[key]) for key in ("before", "after", "noise"))
+    if not before.keys() == after.keys() == noise.keys():
+        raise ValueError("a gap names different joints before and after")
+    return Gap(before, after, noise)
 
 
 def _waveforms_from_dict(w: Mapping[str, Any]) -> Waveforms:
