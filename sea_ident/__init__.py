@@ -35,6 +35,7 @@ _HOME = {
     "run_demo": "demo",
     "write_report": "report",
     "Diagnosis": "discrepancy",
+    "close_gap": "discrepancy",
     "diagnose": "discrepancy",
     "read_diagnosis": "discrepancy",
     "export_mjcf": "export",
@@ -59,6 +60,7 @@ __all__ = [
     "Simulation",
     "Validation",
     "build_regressor",
+    "close_gap",
     "design_excitation",
     "diagnose",
     "export_mjcf",
@@ -84,7 +86,7 @@ if TYPE_CHECKING:
     from sea_ident.base_parameters import find_base_parameters
     from sea_ident.batch import identify_batch
     from sea_ident.demo import run_demo
-    from sea_ident.discrepancy import Diagnosis, diagnose, read_diagnosis
+    from sea_ident.discrepancy import Diagnosis, close_gap, diagnose, read_diagnosis
     from sea_ident.estimation import Model, identify, identify_springs, read_model
     from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
     from sea_ident.excitation import Excitation, design_excitation, read_excitation

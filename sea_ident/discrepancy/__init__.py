@@ -1,5 +1,6 @@
 """Where model and data disagree, which effect is missing, and the model with it added."""
 
+from sea_ident.discrepancy.close import ClosedGap, close_gap
 from sea_ident.discrepancy.diagnose import diagnose
 from sea_ident.discrepancy.diagnosis import (
     Alternative,
@@ -18,6 +19,7 @@ from sea_ident.discrepancy.diagnosis import (
 
 __all__ = [
     "Alternative",
+    "ClosedGap",
     "Detectability",
     "Diagnosis",
     "Gap",
@@ -28,6 +30,7 @@ __all__ = [
     "NextExperiment",
     "Verdict",
     "Waveforms",
+    "close_gap",
     "diagnose",
     "read_diagnosis",
 ]

@@ -1,0 +1,108 @@
+"""Planted effects are found, named and shown to transfer; nothing is named where nothing is missing."""
+
+import json
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.effects import make_effect
+from sea_ident.exceptions import DiagnosisError
+from sea_ident.simulation import PlantedEffect, simulate
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return sea_ident.load_robot("exo_leg")
+
+
+@pytest.fixture(scope="module")
+def excitations(leg):
+    return [sea_ident.design_excitation(leg, base_frequency=0.2, harmonics=5, starts=1, seed=seed) for seed in (0, 1)]
+
+
+def recorded(leg, excitations, planted, seed):
+    return [
+        simulate(leg, excitation, periods=12, seed=seed + k, effects=planted).recording
+        for k, excitation in enumerate(excitations)
+    ]
+
+
+@pytest.fixture(scope="module")
+def intact(leg, excitations):
+    return recorded(leg, excitations, (), 100)
+
+
+@pytest.fixture(scope="module")
+def stribeck(leg, excitations):
+    effect = make_effect("stribeck_friction", "knee", speed=0.1)
+    return recorded(leg, excitations, (PlantedEffect(effect, np.array([1.0])),), 200)
+
+
+@pytest.fixture(scope="module")
+def found(leg, stribeck):
+    training, holdout = stribeck
+    model = sea_ident.identify(leg, training, period=5.0)
+    return sea_ident.diagnose(model, training, holdout=holdout)
+
+
+def test_nothing_is_named_where_nothing_is_missing(leg, intact):
+    training, holdout = intact
+    model = sea_ident.identify(leg, training, period=5.0)
+    diagnosis = sea_ident.diagnose(model, training, holdout=holdout)
+    assert diagnosis.verdict == "none"
+    assert not diagnosis.missing
+
+
+def test_the_planted_effect_is_named_at_its_joint(found):
+    assert found.verdict in ("named", "named_with_remainder")
+    assert (found.missing[0].effect, found.missing[0].joint) == ("stribeck_friction", "knee")
+
+
+def test_its_size_is_the_planted_one(found):
+    size = next(p for p in found.missing[0].parameters if p.unit == "N m")
+    assert abs(size.value - 1.0) < 4.0 * size.std
+    assert size.std < 0.3
+
+
+def test_the_gap_shrinks_on_motion_that_was_not_used(found):
+    record = found.to_dict()
+    assert record["gap"]["shrink_holdout"] > 0.7
+    assert record["gap"]["holdout"]["before"]["knee"] > 0.05
+
+
+def test_what_is_written_is_read_back(found, tmp_path):
+    found.save(tmp_path / "diagnosis.json")
+    record = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert record["verdict"] == found.verdict
+    assert record["missing"][0]["effect"] == "stribeck_friction"
+    assert all(np.isfinite(p["value"]) for m in record["missing"] for p in m["parameters"])
+
+
+def test_the_same_file_twice_proves_nothing(leg, intact):
+    training, _ = intact
+    model = sea_ident.identify(leg, training, period=5.0)
+    with pytest.raises(DiagnosisError, match="proves nothing"):
+        sea_ident.diagnose(model, training, holdout=training)
+
+
+def test_a_recording_of_another_robot_is_refused(leg, intact):
+    training, holdout = intact
+    model = sea_ident.identify(leg, training, period=5.0)
+    renamed = {name.replace("_knee", "_elbow"): values for name, values in holdout.columns.items()}
+    other = type(holdout)(holdout.time, renamed, "another robot")
+    with pytest.raises(DiagnosisError, match="another robot"):
+        sea_ident.diagnose(model, training, holdout=other)
+
+
+def test_the_gap_is_closed_and_the_history_kept(leg, stribeck):
+    training, holdout = stribeck
+    model = sea_ident.identify(leg, training, period=5.0)
+    closed = sea_ident.close_gap(model, training, holdout=holdout)
+    assert closed.verdict == "none"
+    assert closed.added == (("stribeck_friction", "knee"),)
+    assert closed.rounds[0].verdict in ("named", "named_with_remainder")
+    names = {column.name for column in closed.model.base.columns}
+    assert "knee.stribeck_friction" in names
+    before, after = (float(sea_ident.validate(m, holdout).rms[1]) for m in (model, closed.model))
+    assert after < 0.8 * before
