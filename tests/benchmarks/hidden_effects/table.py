@@ -114,7 +114,7 @@ def lines_of(scores: list[Score]) -> list[Line]:
     add(_share("reference", "effect and joint by reference", ">= 95 %",
                (s.finder(s.main) is not None for s in reference), lambda x: x >= 0.95))  # fmt: skip
     for row in ("one", "two", "main_small"):
-        right = [s for s in by_row[row] if s.named and not s.false()]
+        right = [s for s in by_row[row] if s.finder(s.main) is not None and not s.false()]
         add(_number(row, "held-out gap shrink, median where named rightly", ">= 0.8", (s.shrink_holdout for s in right),
                     lambda x: x >= 0.8))  # fmt: skip
         add(_number(row, "forward simulation of q, shrink, median", ">= 0.9", (s.shrink_simulation for s in right),
