@@ -80,7 +80,7 @@ class Fit:
     @property
     def dof(self) -> int:
         """Degrees of freedom of the statistic."""
-        return len(self.whitened) - self.basis.shape[1]
+        return int(len(self.whitened) - self.basis.shape[1])
 
     @property
     def excess(self) -> float:
@@ -255,8 +255,8 @@ class Bench:
             cost, best = new_cost, (values, residual, scale, whitened)
             if converged:
                 break
-            flat = self._scaled_columns(columns, values, design, residual, scale, noise)
-            step = solve(_off(free, whiten(whitener, flat)), whitened)[0]
+            scaled = self._scaled_columns(columns, values, design, residual, scale, noise)
+            step = solve(_off(free, whiten(whitener, scaled)), whitened)[0]
             values = values + step
         if noise is None:
             residual, scale = target - design @ values, np.ones(len(self.data.equations))
@@ -579,8 +579,8 @@ class Bench:
         return out
 
 
-def _thinned(channels: "dict[str, FloatArray] | object", stride: int) -> dict[str, FloatArray]:
-    return {kind: values[::stride] for kind, values in dict(channels).items()}  # type: ignore[call-overload]
+def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:
+    return {kind: values[::stride] for kind, values in channels.items()}
 
 
 def solve(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -702,4 +702,4 @@ def bench_derivatives(
         out.append(parts)
     result = tuple(out[0] - out[1])
     bench._derivatives = (key, result)  # type: ignore[attr-defined]
-    return result  # type: ignore[return-value]
+    return result

@@ -132,7 +132,7 @@ def equation_rows(equations: tuple[Equation, ...], part: Contribution) -> FloatA
 
 def equations_of(robot: Robot) -> tuple[Equation, ...]:
     """The equations that a recording of this robot gives."""
-    found = []
+    found: list[Equation] = []
     for i, joint in enumerate(robot.joints):
         kinds = (EquationKind.MOTOR, EquationKind.LINK) if joint.elastic else (EquationKind.SUM,)
         found.extend(Equation(joint.name, i, kind) for kind in kinds)

@@ -91,7 +91,7 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     flat = np.stack([whiten(whitener, residual) for residual in residuals]) / np.sqrt(periods)
     flat = flat - (flat @ free) @ free.T
     flat -= flat.mean(axis=0)
-    middle = (np.arange(periods) + 0.5) * bench.data.period
+    middle: FloatArray = (np.arange(periods, dtype=np.float64) + 0.5) * bench.data.period
     directions = _directions(bench, fit, whitener / np.sqrt(periods), free, middle, temperature)
     omnibus = _omnibus(flat, middle, noise)
     tests = max(len(directions), 1)
@@ -150,7 +150,7 @@ def _directions(
             own = own if np.all(np.isfinite(own)) else None
         try:
             spectra = bench.spectra_of(effect.steady(state), fit.effects) * fit.scale[:, None]
-            variants = [replace(effect, time_constant=c) for c in _time_constants(effect, middle)]
+            variants = [replace(effect, time_constant=c) for c in _time_constants(effect, middle)]  # type: ignore[call-arg]
             changes = [v.change(middle, own) for v in variants]
         except EffectError:
             continue

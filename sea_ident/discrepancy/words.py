@@ -42,8 +42,8 @@ def paragraph(facts: Facts) -> str:
     if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
         worst = max(facts.gap.before, key=lambda j: facts.gap.before[j])
         parts.append(
-            f"With it the gap on this recording goes from {facts.gap.before[worst]:.3g} to {facts.gap.after[worst]:.3g} "
-            f"N m at {worst}, where it was largest."
+            f"With it the gap on this recording goes from {facts.gap.before[worst]:.3g} to "
+            f"{facts.gap.after[worst]:.3g} N m at {worst}, where it was largest."
         )
         if facts.held is not None:
             parts.append(f"On held-out data the gap shrinks by {100 * facts.held.shrink:.0f} %.")

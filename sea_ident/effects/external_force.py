@@ -13,7 +13,6 @@ from sea_ident.effects.signal import is_closed
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 
-
 _BEGINS = 32
 """Beginnings of a push that a search tries in a period."""
 

@@ -10,7 +10,6 @@ from sea_ident.effects.base import Action, Anchor, Column, Contribution, Side, S
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
 
-
 _STEPS = 12
 """Newton steps from the torque to the command."""
 
