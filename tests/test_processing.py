@@ -65,3 +65,78 @@ def test_no_torque(leg, truth):
     columns = {k: v for k, v in recording.columns.items() if k != "tau_motor_knee"}
     with pytest.raises(RecordingError, match=r"'knee' has neither tau_motor_knee nor current_knee"):
         process(Recording(recording.time, columns, "some.csv"), leg, period=10.0)
+
+
+def test_saturated_current_is_named(leg, truth):
+    recording = record(leg, truth, 4, torque_noise=0.05)
+    torque = recording.columns["tau_motor_hip"]
+    cut = recording.replace_columns({"tau_motor_hip": np.minimum(torque, 0.7 * torque.max())})
+    with pytest.warns(SeaIdentWarning, match="tau_motor_hip stays at its highest value"):
+        process(cut, leg, period=10.0)
+
+
+def test_one_joint_that_never_moves_is_named(leg, truth):
+    recording = record(leg, truth, 4, torque_noise=0.05)
+    held = recording.replace_columns({"q_knee": np.full(8000, -0.2), "theta_knee": np.full(8000, -0.2)})
+    with pytest.warns(SeaIdentWarning) as caught:
+        process(held, leg, period=10.0)
+    assert any("q_knee constant" in str(w.message) for w in caught)
+
+
+def test_period_that_is_no_multiple_of_the_sample_time_is_resampled(leg, truth):
+    # the same motion, sampled 3 % more slowly than a whole number of times per period
+    recording = record(leg, truth, 6)
+    time = np.arange(0.0, 59.9, 0.00515)
+    columns = {name: np.interp(time, recording.time, values) for name, values in recording.columns.items()}
+    found = process(Recording(time, columns, "odd"), leg, period=10.0, link_harmonics=5, motor_harmonics=30)
+    assert any("no multiple of the sample time" in note for note in found.notes)
+    start = time[-1] + 0.00515 - found.periods * 10.0
+    phase = start + found.motion.time
+    expected = np.interp(phase % 10.0, truth.motion.time, truth.motion.q[:, 0], period=10.0)
+    np.testing.assert_allclose(found.motion.q[:, 0], expected, atol=2e-4)
+
+
+def test_uneven_samples_are_resampled(leg, truth):
+    rng = np.random.default_rng(0)
+    recording = record(leg, truth, 4)
+    time = np.sort(rng.uniform(0.0, 39.99, 8000))
+    time = time[np.concatenate([[True], np.diff(time) > 1e-6])]
+    columns = {name: np.interp(time, recording.time, values) for name, values in recording.columns.items()}
+    uneven = process(Recording(time, columns, "uneven"), leg, period=10.0, link_harmonics=5, motor_harmonics=30)
+    assert any("not evenly spaced" in note for note in uneven.notes)
+
+
+def test_leading_transient_is_left_out(leg, truth):
+    recording = record(leg, truth, 8, torque_noise=0.05, encoder_noise=1e-5)
+    swing = 0.2 * np.exp(-recording.time / 3.0)
+    started = recording.replace_columns({"q_hip": recording.columns["q_hip"] + swing})
+    found = process(started, leg, period=10.0)
+    assert found.periods < 8
+    assert any("left out as transient" in note for note in found.notes)
+
+
+def test_recording_without_a_period_is_filtered_and_says_so(leg, truth):
+    recording = record(leg, truth, 1, torque_noise=0.05, encoder_noise=1e-6)
+    with pytest.warns(SeaIdentWarning, match="no period: positions filtered"):
+        found = process(recording, leg)
+    assert not found.periodic
+    middle = slice(300, -300)
+    inside = np.searchsorted(truth.motion.time, found.motion.time)[middle]
+    np.testing.assert_allclose(found.motion.dq[middle], truth.motion.dq[inside], atol=0.02)
+
+
+def test_motor_torque_from_current_by_direction(leg, truth):
+    recording = record(leg, truth, 4)
+    columns = {k: v for k, v in recording.columns.items() if not k.startswith("tau_motor")}
+    for i, joint in enumerate(leg.joints):
+        actuator = joint.actuator
+        driving = np.sign(truth.tau_motor[:, i] * truth.motion.dtheta[:, i])
+        current = truth.tau_motor[:, i] / (
+            actuator.gear_ratio * actuator.torque_constant * actuator.efficiency**driving
+        )
+        columns[f"current_{joint.name}"] = np.tile(current, 4)
+    noise = 1e-9 * np.random.default_rng(0).standard_normal(8000)
+    columns["q_hip"] = columns["q_hip"] + noise  # so that periods are no copies
+    found = process(Recording(recording.time, columns, "currents"), leg, period=10.0, motor_harmonics=60)
+    moving = np.abs(truth.motion.dtheta) > 0.01
+    np.testing.assert_allclose(found.tau_motor[moving], truth.tau_motor[moving], rtol=1e-6, atol=1e-6)

@@ -129,11 +129,14 @@ def detectability(
 ) -> tuple[Detectability, ...]:
     """Smallest size of every candidate that would have been found, and what it is easily taken for."""
     tests = max(sum(c.tests for c in candidates), 1)
+    candidates = [c for c in candidates if np.any(c.directions)]
     bases = [_orthonormal(c.directions) for c in candidates]
     labels = [_label(c) for c in candidates]
     stack = np.concatenate([b for b in bases], axis=1) if bases else np.zeros((len(fit.whitened), 0))
     gram = stack.T @ stack
     starts = np.concatenate([[0], np.cumsum([b.shape[1] for b in bases])]).astype(int)
+    # energy of one basis in the span of the other; for single columns this is cos^2, else an upper bound of the largest
+    share = np.add.reduceat(np.add.reduceat(gram**2, starts[:-1], axis=0), starts[:-1], axis=1) if len(gram) else gram
     out = []
     for i, candidate in enumerate(candidates):
         threshold = float(stats.f.isf(FAMILY_LEVEL / tests, candidate.columns, max(noise.total_freedom, 4.0)))
@@ -144,8 +147,9 @@ def detectability(
         mine = slice(starts[i], starts[i + 1])
         alike = []
         for k in range(len(candidates)):
-            block = gram[mine, starts[k] : starts[k + 1]]
-            if k != i and block.size and float(np.linalg.norm(block, 2)) ** 2 > LOOKS_ALIKE:
+            if k == i or share[i, k] <= LOOKS_ALIKE:
+                continue
+            if float(np.linalg.norm(gram[mine, starts[k] : starts[k + 1]], 2)) ** 2 > LOOKS_ALIKE:
                 alike.append(labels[k])
         out.append(
             Detectability(

@@ -244,7 +244,7 @@ class Bench:
         step = np.zeros(0)
         for _ in range(MOST_FIT_STEPS if noise is not None else 1):
             residual = target - design @ values
-            scale = np.ones(len(self.data.equations)) if noise is None else self.link_scale(columns, values)
+            scale = np.ones(len(self.data.equations)) if noise is None else self.link_scale(columns, design, values)
             whitened = _off(free, whiten(whitener, residual * scale))
             new_cost = float(whitened @ whitened)
             if best is not None and new_cost > cost * (1.0 + 1e-9):
@@ -273,15 +273,43 @@ class Bench:
         basis = np.concatenate([free, basis], axis=1)
         return Fit(effects, columns, values, residual, scale, whitened, basis, factor, shapes)
 
-    def link_scale(self, columns: Sequence[Column], values: FloatArray) -> FloatArray:
+    def link_scale(self, columns: Sequence[Column], design: ComplexArray, values: FloatArray) -> FloatArray:
         """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
-        stiffness = {c.joint: float(v) for c, v in zip(columns, values, strict=True) if c.effect == "spring_stiffness"}
-        scale = np.ones(len(self.data.equations))
+        first = self.first_stiffness
+        slopes = self.stiffness_slopes(columns, design) @ values
+        return np.where(first > 0.0, first / np.maximum(slopes, 0.02 * first + 1e-300), 1.0)
+
+    @cached_property
+    def first_stiffness(self) -> FloatArray:
+        """(E,) mean slope of the spring torque over the deflection in the first fit, 0 where there is no spring."""
+        fit = self.first_fit
+        slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
         for e, equation in enumerate(self.data.equations):
-            first = self.first_fit.parameters.get(f"{equation.joint}.spring_stiffness", 0.0)
-            if equation.kind is EquationKind.LINK and first > 0.0 and equation.joint in stiffness:
-                scale[e] = first / max(stiffness[equation.joint], 0.02 * first)
-        return scale
+            if equation.kind is EquationKind.LINK:
+                known = self.robot.spring(equation.joint).stiffness or 0.0
+                slopes[e] = max(slopes[e], 0.2 * known)
+        return np.asarray(np.maximum(slopes, 0.0), dtype=np.float64)
+
+    def stiffness_slopes(self, columns: Sequence[Column], design: ComplexArray) -> FloatArray:
+        """(E, p) part of every parameter in the mean slope of the spring torque of a link over its deflection."""
+        out = np.zeros((len(self.data.equations), len(columns)))
+        for e, deflection in self._deflections.items():
+            joint = self.data.equations[e].joint
+            own = [k for k, c in enumerate(columns) if c.joint == joint and c.side is Side.SPRING]
+            power = float(np.sum(np.abs(deflection) ** 2))
+            if own and power > 0.0:
+                out[e, own] = -np.real(deflection.conj() @ design[1:, e, own]) / power
+        return out
+
+    @cached_property
+    def _deflections(self) -> dict[int, ComplexArray]:
+        """(H,) spectrum of the deflection, without its mean, for every link equation."""
+        deflection = spectrum(self.data.motion.deflection, self.data.harmonics)[1:]
+        return {
+            e: deflection[:, equation.index]
+            for e, equation in enumerate(self.data.equations)
+            if equation.kind is EquationKind.LINK
+        }
 
     def _scaled_columns(
         self,
@@ -296,12 +324,11 @@ class Bench:
         out = design * scale[:, None]
         if noise is None:
             return out
-        for k, column in enumerate(columns):
-            if column.effect != "spring_stiffness" or values[k] == 0.0:
-                continue
-            for e, equation in enumerate(self.data.equations):
-                if equation.kind is EquationKind.LINK and equation.joint == column.joint:
-                    out[:, e, k] += scale[e] * residual[:, e] / values[k]
+        slopes = self.stiffness_slopes(columns, design)
+        for e in self._deflections:
+            total = float(slopes[e] @ values)
+            if self.first_stiffness[e] > 0.0 and total > 0.02 * self.first_stiffness[e]:
+                out[:, e] += scale[e] * np.outer(residual[:, e], slopes[e] / total)
         return out
 
     @cached_property

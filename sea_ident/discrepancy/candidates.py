@@ -135,7 +135,7 @@ def examine(
     values = np.einsum("vkl,vl->vk", inverse, score / scale) / scale
     values = values / np.where(norms > 0.0, norms, 1.0).reshape(count, width)
     gains = np.einsum("vk,vk->v", score * norms.reshape(count, width), values)
-    allowed = np.array([_allowed(bench, variant, value) for variant, value in zip(variants, values, strict=True)])
+    allowed = np.array([_allowed(bench, fit, variant, value) for variant, value in zip(variants, values, strict=True)])
     # those that single precision leaves in doubt are looked at one by one, as are the best
     doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= 10 else set()
     tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
@@ -161,7 +161,7 @@ def _exactly(
     across[:, strength <= ABSORBED] = 0.0
     size = np.where(norms > 0.0, norms, 1.0)
     values = np.linalg.pinv(across, rcond=1e-4) @ left / size
-    if not _allowed(bench, effect, values):
+    if not _allowed(bench, fit, effect, values):
         values = _allowed_part(bench, effect, across, left) / size
     gain = float((across * size * values).sum(axis=1) @ left)
     amounts = effect.amounts if isinstance(effect, SignalEffect) else ()
@@ -170,7 +170,7 @@ def _exactly(
         effect = replace(effect, **held)  # type: ignore[arg-type]
     return Candidate(
         effect=effect,
-        gain=gain,
+        gain=gain if _allowed(bench, fit, effect, values) else 0.0,
         columns=len(values),
         tests=tests,
         values=values,
@@ -205,7 +205,8 @@ def _with_smoothing_of(exact: Effect, effect: Effect) -> Effect:
     return replace(effect, smoothing=exact.smoothing)  # type: ignore[call-arg]
 
 
-def _allowed(bench: Bench, effect: Effect, values: FloatArray) -> bool:
-    """Whether estimates respect the signs that physics demands."""
+def _allowed(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) -> bool:
+    """Whether estimates respect the signs that physics demands, and make sense beside the other parameters."""
     columns = effect.columns(bench.robot)
-    return all(not column.nonnegative or value >= 0.0 for column, value in zip(columns, values, strict=False))
+    signs = all(not column.nonnegative or value >= 0.0 for column, value in zip(columns, values, strict=False))
+    return signs and (not columns or effect.plausible(values, fit.parameters))

@@ -25,7 +25,7 @@ from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, Settled, needed_share, search, settle_again
+from sea_ident.discrepancy.search import Selection, Settled, needed_share, own_torque, search, settle_again
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.signal import SignalEffect
@@ -257,7 +257,7 @@ def _missing(
     alternatives: dict[int, tuple[Alternative, ...]],
     held: HeldOut | None,
 ) -> list[MissingEffect]:
-    fit, noise = selection.final.fit, selection.final.noise
+    fit = selection.final.fit
     first = len(fit.effects) - selection.added
     counts = bench.counts(fit.effects)
     out = []
@@ -276,7 +276,7 @@ def _missing(
                 effect=effect.name,
                 joint=effect.joint,
                 parameters=tuple(parameters),
-                torque_share=_torque_share(bench, fit, noise, position),
+                torque_share=own_torque(bench, fit, position),
                 p_value=selection.p_values[k],
                 alternatives=alternatives.get(position, ()),
                 transfer=None if transfer is None or not transfer.tested else transfer.share,
@@ -302,20 +302,6 @@ def _shape_parameters(bench: Bench, fit: Fit, position: int) -> list[MissingPara
             MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
         )
     return out
-
-
-def _torque_share(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> float:
-    """Largest rms of the torque of an effect in an equation, as a share of the rms torque of the motor there."""
-    effect = fit.effects[position]
-    if isinstance(effect, SignalEffect):
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        change = (
-            bench.predicted(others, fit.parameters).residual - bench.predicted(fit.effects, fit.parameters).residual
-        )
-    else:
-        change = assess.contribution(bench, fit, [position])
-    rms = np.sqrt(np.sum(np.abs(change) ** 2, axis=0))
-    return float(np.max(rms / np.maximum(bench.torque_rms, 1e-300)))
 
 
 def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:

@@ -7,7 +7,8 @@ import numpy as np
 from scipy import stats
 from scipy.optimize import brentq
 
-from sea_ident.discrepancy.bench import Bench, Fit, free_shapes
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, whiten
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
@@ -27,14 +28,29 @@ TOLERATED = 0.0
 SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
-BESIDE_ANOTHER = 0.05
+BESIDE_ANOTHER = 0.12
 """And by this share of what the largest effect beside it does: the form of that one is never known better."""
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
 
+FAR = 3.0
+"""Statistic over degrees of freedom beyond which shapes are left alone: they would bend to the misfit."""
+
+LARGE_TORQUE = 0.3
+"""An effect of more than this share of the torque (rms) must be visible as such, ..."""
+
+CANCELLED = 0.05
+"""... with more than this share of it not taken up by other parameters."""
+
+SCATTER_LEVEL = 1e-4
+"""Probability that an effect must not exceed by the scatter of the periods along its own columns."""
+
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
+
+MOST_SETTLINGS = 3
+"""Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
 FINALISTS = 5
 """Candidates that are refitted with everything free before one is accepted."""
@@ -101,7 +117,9 @@ def settle_again(bench: Bench, fit: Fit) -> Settled:
     share = needed_share(bench, fit, plain, TOLERATED) if TOLERATED else 0.0
     noise = bench.with_remainder(plain, share)
     anchored = bench.anchored(fit.effects, fit.parameters)
-    return Settled(bench.refine(anchored, noise, start=fit.parameters), noise, share)
+    far = bench.statistic(fit, noise) > FAR * fit.dof
+    only = len(bench.effects) if far else 0
+    return Settled(bench.refine(anchored, noise, start=fit.parameters, only=only), noise, share)
 
 
 def needed_share(bench: Bench, fit: Fit, noise: NoiseFloor, ratio: float) -> float:
@@ -161,8 +179,18 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
         new, p_value = step
         largest = max(largest, torque_change(bench, now.fit, new))
         added.append(p_value)
+        last = now
         now = settle_again(bench, new)
+        for _ in range(MOST_SETTLINGS):
+            before = now.fit.statistic / now.fit.dof
+            now = settle_again(bench, now.fit)
+            if now.fit.statistic / now.fit.dof > 0.98 * before:
+                break
         now = _exchange(bench, now, len(added))
+        if not all(physical(bench, now.fit, -k) for k in range(1, len(added) + 1)):
+            added.pop()
+            now = last
+            break
     now, added = _eliminate(bench, now, added, tests)
     return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
 
@@ -176,18 +204,78 @@ def _next(
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
     ]
     best: tuple[float, Fit, float] | None = None
+    periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
     for candidate in worth[:FINALISTS]:
         new = bench.refine((*fit.effects, candidate.effect), noise, start=fit.parameters, only=len(bench.effects))
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
             continue
-        if torque_change(bench, fit, new) < smallest:
+        change = torque_change(bench, fit, new)
+        own = own_torque(bench, new, -1)
+        cancels = own > LARGE_TORQUE and change < CANCELLED * own
+        if min(change, 2.0 * own) < smallest or cancels or at_a_bound(new.effects[-1]):
+            continue
+        if scatter_p(periods, fit.whitened - new.whitened) > SCATTER_LEVEL:
             continue
         score = new.statistic + penalty(candidate.effect, bench)
         if best is None or score < best[0]:
             best = (score, new, p_value)
     return None if best is None else (best[1], best[2])
+
+
+def own_torque(bench: Bench, fit: Fit, position: int) -> float:
+    """Largest rms of the torque of an effect in an equation, as a share of the rms torque of the motor there [-]."""
+    position %= len(fit.effects)
+    effect = fit.effects[position]
+    if is_signal(effect):
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        with_it, without = (bench.predicted(model, fit.parameters).residual for model in (fit.effects, others))
+        torque = without - with_it
+    else:
+        own = np.array([fit.parameters[c.name] for c in effect.columns(bench.robot)])
+        torque = bench.column_spectra(effect, fit.effects) @ own
+    rms = np.sqrt(np.sum(np.abs(torque) ** 2, axis=0))
+    return float(np.max(rms / np.maximum(bench.torque_rms, 1e-300)))
+
+
+def flat_periods(bench: Bench, now: Settled) -> FloatArray:
+    """(P, M) whitened residuals of the periods, in units of the noise of their mean."""
+    whitener, free = bench.whitener(now.noise), bench.free_basis(now.noise)
+    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(now.fit)])
+    return flat - (flat @ free) @ free.T
+
+
+def scatter_p(periods: FloatArray, change: FloatArray) -> float:
+    """Probability of a change of the mean by the scatter of the periods along that very change.
+
+    Noise that gathers where the change is large (friction that differs from pass to pass) is larger there than the
+    noise floor, which is one for all phases of a period, says.
+
+    Args:
+        periods: (P, M) whitened residuals of the periods.
+        change: (M,) change of the whitened mean residual.
+
+    Returns:
+        Probability by Student's t; 0 where there are too few periods to tell.
+    """
+    count = len(periods)
+    if count < 4:
+        return 0.0
+    along = periods @ change / np.linalg.norm(change)
+    spread = float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / count))
+    freedom = 2.0 * (count - 1) ** 2 / (3.0 * count - 4.0)
+    return 2.0 * float(stats.t.sf(float(np.linalg.norm(change)) / max(spread, 1e-300), freedom))
+
+
+def at_a_bound(effect: Effect) -> bool:
+    """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else."""
+    for shape in effect.shapes:
+        if shape.logarithmic and shape.name not in ("smoothing", "order", "time_constant"):
+            value = float(getattr(effect, shape.name))
+            if value < 1.02 * shape.lower or value > 0.98 * shape.upper:
+                return True
+    return False
 
 
 def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
@@ -216,6 +304,8 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
     if not columns:
         return True
     values = fit.values[start : start + len(columns)]
+    if not effect.plausible(values, fit.parameters):
+        return False
     spectra = bench.column_spectra(effect, fit.effects)
     power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))
     total = np.sqrt(np.sum(np.abs(spectra @ values) ** 2, axis=0))
@@ -229,9 +319,7 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
 
 
 def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
-    """Replace effects that were added by better ones, now that the others are there."""
-    if added < 2:
-        return now
+    """Replace effects that were added by better ones, now that the others are there and the noise floor is right."""
     first = len(now.fit.effects) - added
     for position in range(first, first + added):
         fit, noise = now.fit, now.noise

@@ -249,6 +249,8 @@ def _trend(
         key = (other.effect.name, other.effect.joint)
         if key == (direction.effect.name, direction.effect.joint):
             continue
+        if direction.effect.name == "temperature_friction" and key == ("friction_drift", direction.effect.joint):
+            continue  # the same without its cause: a measured temperature says more than any time
         share = float(np.sum(_explained(explained, [other]) ** 2) / np.sum(explained**2))
         lost = gain - _gain(left, other)
         if lost < 14.0 and share > alternatives.get(key, (other.effect, 0.0))[1]:

@@ -1,13 +1,14 @@
 """Play in series with the spring."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape
-from sea_ident.effects.spring import SpringEffect
+from sea_ident.effects.base import Column, Shape, State
+from sea_ident.effects.spring import SpringEffect, deflections
 from sea_ident.robot import Robot
 
 
@@ -26,12 +27,21 @@ class Backlash(SpringEffect):
 
     name: ClassVar[str] = "backlash"
     source: ClassVar[str] = "Nordin, Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("half_width", "rad", 2e-4, 0.05, points=8),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("half_width", "rad", 1e-5, 0.5),)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
         torque, position = self.units_of(robot)
         return (Column(self.parameter_name(), f"{torque}/{position}", self.name, self.joint, self.side, True),)
+
+    def variants(self, state: State) -> tuple["Backlash", ...]:
+        """Widths within the deflections of this motion."""
+        return tuple(replace(self, half_width=width) for width in deflections(state, self.required_joint, 18))
+
+    def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
+        """Whether K is about the stiffness of the spring that the play is in series with."""
+        stiffness = parameters.get(f"{self.joint}.spring_stiffness", 0.0)
+        return bool(0.4 * stiffness < values[0] < 2.5 * stiffness)
 
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """-clip(theta - q, -w, w)."""

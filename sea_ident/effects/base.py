@@ -323,6 +323,13 @@ class Effect(ABC):
         """The same effect, knowing what it needs of the rest of the model; by default it needs nothing."""
         return self
 
+    def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
+        """Whether estimates (k,) of its columns make sense beside the other parameters of a model, by name.
+
+        What `Column.nonnegative` says need not be said again.
+        """
+        return True
+
     def shape_unit(self, shape: Shape, robot: Robot) -> str:
         """Unit of a shape parameter at this joint: m in place of rad where the joint slides."""
         if self.joint is not None and robot.joints[robot.index(self.joint)].prismatic:

@@ -2,7 +2,9 @@
 
 from typing import ClassVar, Self
 
-from sea_ident.effects.base import JointEffect, Side
+import numpy as np
+
+from sea_ident.effects.base import JointEffect, Side, State
 from sea_ident.robot import Robot
 
 
@@ -15,3 +17,12 @@ class SpringEffect(JointEffect):
     def instances(cls, robot: Robot) -> tuple[Self, ...]:
         """At every elastic joint."""
         return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
+
+
+def deflections(state: State, joint: str, points: int) -> tuple[float, ...]:
+    """Sizes of the deflection of a joint that a search should try, from a small one to the largest of the motion."""
+    size = np.abs(state.motion.deflection[:, state.robot.index(joint)])
+    largest = max(float(size.max()), 1e-9)
+    even = np.quantile(size, np.linspace(0.03, 0.97, points - 3))
+    small = largest * np.array([0.01, 0.03, 0.1])
+    return tuple(float(v) for v in np.unique(np.concatenate([small, even])) if v > 0.0)

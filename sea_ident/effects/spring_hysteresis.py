@@ -1,11 +1,12 @@
 """Dry friction inside the spring: loading and unloading take two ways."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape, Side
+from sea_ident.effects.base import Column, Shape, Side, State
 from sea_ident.effects.memory import MemoryEffect
+from sea_ident.effects.spring import deflections
 from sea_ident.robot import Robot
 
 
@@ -25,7 +26,7 @@ class SpringHysteresis(MemoryEffect):
     name: ClassVar[str] = "spring_hysteresis"
     side: ClassVar[Side] = Side.SPRING
     source: ClassVar[str] = "Iwan, A distributed-element model for hysteresis, J. Applied Mechanics 33, 1966"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("slip", "rad", 2e-4, 0.05, points=8),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("slip", "rad", 1e-5, 0.5),)
     memory_size: ClassVar[int] = 2
 
     @classmethod
@@ -40,6 +41,10 @@ class SpringHysteresis(MemoryEffect):
             Column(self.parameter_name(label), torque, self.name, self.joint, self.side, True)
             for label in ("narrow", "wide")
         )
+
+    def variants(self, state: State) -> tuple["SpringHysteresis", ...]:
+        """Widths within the deflections of this motion."""
+        return tuple(replace(self, slip=width) for width in deflections(state, self.required_joint, 12))
 
     def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Theta - q."""

@@ -57,20 +57,25 @@ class TransmissionCoupling(Effect):
         return tuple(cls(joint=joint, other=other) for joint, other in pairs)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
-        """One column: the ratio r."""
+        """The ratio r as the inertia of the motor shows it, and as its friction does."""
         self._indices(robot)
-        return (Column(self.parameter_name(f"from_{self.other}"), "-", self.name, self.joint, self.side),)
+        return tuple(
+            Column(self.parameter_name(f"{label}_from_{self.other}"), "-", self.name, self.joint, self.side)
+            for label in ("inertia", "friction")
+        )
 
     def evaluate(self, state: State) -> Contribution:
         """First order in r: the motor feels the other link, and the other link feels the motor."""
         i, k = self._indices(state.robot)
         motion = state.motion
         inertia, viscous, coulomb = self._motor(state.robot)
-        link, motor = (np.zeros((len(motion), state.robot.n, 1)) for _ in range(2))
+        link, motor = (np.zeros((len(motion), state.robot.n, 2)) for _ in range(2))
         sign = smooth_sign(motion.dtheta[:, i], self.smoothing)
         slope = (1.0 - sign**2) / self.smoothing
-        motor[:, i, 0] = inertia * motion.ddq[:, k] + (viscous + coulomb * slope) * motion.dq[:, k]
-        link[:, k, 0] = inertia * motion.ddtheta[:, i] + viscous * motion.dtheta[:, i] + coulomb * sign
+        motor[:, i, 0] = inertia * motion.ddq[:, k]
+        link[:, k, 0] = inertia * motion.ddtheta[:, i]
+        motor[:, i, 1] = (viscous + coulomb * slope) * motion.dq[:, k]
+        link[:, k, 1] = viscous * motion.dtheta[:, i] + coulomb * sign
         return Contribution(link, motor)
 
     def anchored(self, anchor: Anchor) -> "TransmissionCoupling":
@@ -92,7 +97,7 @@ class TransmissionCoupling(Effect):
         """The friction; the inertia acts in `modified`."""
         i, k = self._indices(robot)
         _, viscous, coulomb = self._motor(robot)
-        ratio = float(values[0])
+        ratio = float(values[1])
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
             own, turned = state.dtheta[i], state.dtheta[i] + ratio * state.dq[k]
