@@ -11,6 +11,7 @@ from sea_ident.excitation.criteria import (
 )
 from sea_ident.excitation.design import design_excitation
 from sea_ident.excitation.design_model import reduced_effects
+from sea_ident.excitation.efficiency import EfficiencyBound, bound_log_det
 from sea_ident.excitation.ramp import Ramp, RampMotion
 from sea_ident.excitation.result import Excitation, read_excitation
 from sea_ident.excitation.springs import PredictedMotors
@@ -24,12 +25,14 @@ __all__ = [
     "DOptimality",
     "Discrimination",
     "EOptimality",
+    "EfficiencyBound",
     "Excitation",
     "PredictedMotors",
     "Progress",
     "Ramp",
     "RampMotion",
     "Scaling",
+    "bound_log_det",
     "design_excitation",
     "read_excitation",
     "reduced_effects",
