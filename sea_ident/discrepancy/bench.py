@@ -123,6 +123,7 @@ class Bench:
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
         self._period_targets = [spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor]
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
+        self.derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
 
     # -- columns of the mean ---------------------------------------------------------------------------------------
@@ -701,9 +702,8 @@ def bench_derivatives(
     inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
     rotors = np.array([parameters.get(f"{rotor.rotor_group}.rotor_inertia", 0.0) for rotor in robot.rotors])
     key = (tuple(inertial), tuple(rotors), id(state))
-    cached = getattr(bench, "_derivatives", None)
-    if cached is not None and cached[0] == key:
-        return cached[1]  # type: ignore[no-any-return]
+    if bench.derivatives is not None and bench.derivatives[0] == key:
+        return bench.derivatives[1]
     unit = np.zeros_like(inertial)
     unit[::10] = 1.0
     offset = 1.0 + 10.0 * float(np.max(np.abs(inertial), initial=0.0))
@@ -727,6 +727,6 @@ def bench_derivatives(
         upper = np.triu(parts[2])
         parts[2] = upper + np.triu(upper, 1).transpose(0, 2, 1)
         out.append(parts)
-    result = tuple(out[0] - out[1])
-    bench._derivatives = (key, result)  # type: ignore[attr-defined]
-    return result
+    change = out[0] - out[1]
+    bench.derivatives = (key, (change[0], change[1], change[2]))
+    return bench.derivatives[1]

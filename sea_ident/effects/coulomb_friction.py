@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, JointEffect, Shape, Side, smooth_sign
+from sea_ident.effects.base import Column, Effect, JointEffect, Shape, Side, smooth_sign
 from sea_ident.robot import Robot
 
 
@@ -25,6 +25,11 @@ class CoulombFriction(JointEffect):
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Vantilt et al., ICRA 2015, eq. 3"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("smoothing", "rad/s", 1e-4, 0.3),)
+
+    @classmethod
+    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
+        """At every joint; slides move at tenths of a metre per second, so theirs turns over at 1 mm/s."""
+        return tuple(cls(joint.name, 0.001) if joint.prismatic else cls(joint.name) for joint in robot.joints)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
