@@ -38,7 +38,6 @@ class MemoryEffect(JointEffect):
         path = self.path(q, theta)
         memory: tuple[float, ...] = (0.0,) * self.memory_size
         if is_closed(path):
-            memory = self.advance(memory, float(path[0]))  # from rest at zero, as it was built
             steps = np.diff(path, prepend=path[-1]).tolist()
             for distance in steps:
                 memory = self.advance(memory, distance)
