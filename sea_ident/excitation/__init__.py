@@ -12,6 +12,7 @@ from sea_ident.excitation.criteria import (
 from sea_ident.excitation.design import design_excitation
 from sea_ident.excitation.design_model import reduced_effects
 from sea_ident.excitation.efficiency import EfficiencyBound, bound_log_det
+from sea_ident.excitation.joint_trajectory import write_trajectory_bag, write_trajectory_yaml
 from sea_ident.excitation.ramp import Ramp, RampMotion
 from sea_ident.excitation.result import Excitation, read_excitation
 from sea_ident.excitation.springs import PredictedMotors
@@ -37,5 +38,7 @@ __all__ = [
     "read_excitation",
     "reduced_effects",
     "sample_trajectory",
+    "write_trajectory_bag",
     "write_trajectory_csv",
+    "write_trajectory_yaml",
 ]

@@ -28,13 +28,7 @@ def sample_trajectory(excitation: Excitation, rate: float, periods: int = 1) -> 
         ExcitationError: a rate that cannot show the highest harmonic, or less than one period.
     """
     series = excitation.series
-    highest = series.harmonics * series.base_frequency
-    if not (np.isfinite(rate) and rate > 2.0 * highest):
-        raise ExcitationError(
-            f"rate is {rate} Hz; the highest harmonic is {highest:g} Hz, which needs more than {2 * highest:g}"
-        )
-    if periods < 1:
-        raise ExcitationError(f"periods is {periods}; give at least 1")
+    check_sampling(series.base_frequency, series.harmonics, rate, periods)
     ramp_in, ramp_out = excitation.ramp_in, excitation.ramp_out
     begin, first = (0.0, 0.0) if ramp_in is None else (ramp_in.duration, ramp_in.phase)
     end = begin + periods * series.period
@@ -52,6 +46,27 @@ def sample_trajectory(excitation: Excitation, rate: float, periods: int = 1) -> 
         parts.append(ramp_out.motion(np.minimum(time[time >= end] - end, ramp_out.duration)))
     joined = Motion.concatenate(parts)
     return Motion.rigid(time, joined.q, joined.dq, joined.ddq)
+
+
+def check_sampling(base_frequency: float, harmonics: int, rate: float, periods: int) -> None:
+    """Refuse samples that could not show a motion.
+
+    Args:
+        base_frequency: of its series [Hz].
+        harmonics: L.
+        rate: samples per second [Hz].
+        periods: whole periods.
+
+    Raises:
+        ExcitationError: a rate that cannot show the highest harmonic, or less than one period.
+    """
+    highest = harmonics * base_frequency
+    if not (np.isfinite(rate) and rate > 2.0 * highest):
+        raise ExcitationError(
+            f"rate is {rate} Hz; the highest harmonic is {highest:g} Hz, which needs more than {2 * highest:g}"
+        )
+    if periods < 1:
+        raise ExcitationError(f"periods is {periods}; give at least 1")
 
 
 def write_trajectory_csv(excitation: Excitation, path: str | Path, rate: float = 1000.0, periods: int = 1) -> None:
