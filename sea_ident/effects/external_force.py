@@ -112,7 +112,8 @@ def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray) -> FloatAr
     """(nv, 3) transposed Jacobian of the centre of mass of a body, in the axes of the base."""
     model = robot.extended_model
     pin.computeJointJacobians(model, data, x)
-    full = pin.getJointJacobian(model, data, body, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    # a robot with a single velocity gets its Jacobian as a vector
+    full = pin.getJointJacobian(model, data, body, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
     arm = data.oMi[body].rotation @ model.inertias[body].lever
     jacobian: FloatArray = full[:3] - pin.skew(arm) @ full[3:]
     return jacobian.T
