@@ -1,6 +1,6 @@
 """Do the intervals hold the truth, is the estimate unbiased, and what is weighting by sample worth?
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--jobs 2]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--keep FILE]
 
 Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with and without friction that
 varies from pass to pass. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
@@ -12,10 +12,11 @@ is itself off by sqrt(20 / M) of what 20 passes scatter, 0.14 for 1000, which sh
 import argparse
 import time
 import warnings
+from functools import partial
+from pathlib import Path
 
 import numpy as np
-from experiments import Pool, Sensors, cached_pool, draw
-from joblib import Parallel, delayed
+from experiments import Pool, Sensors, cached_pool, draw, each_seed
 
 from sea_ident.base_parameters import find_base_parameters
 from sea_ident.effects import base_effects
@@ -123,23 +124,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--passes", type=int, default=1000)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--keep", type=Path, help="file of seeds that are done; a run that was cut goes on from it")
     arguments = parser.parse_args()
     for title, name, passes, settings in (
         ("friction varies from pass to pass", "jitter", arguments.passes, {}),
         ("every pass alike", "steady", 40, {"jitter": FrictionJitter.none()}),
     ):
-        begin = time.perf_counter()
+        begin = time.process_time()
         pool = cached_pool(name, passes, 1, **settings)
         base = find_base_parameters(pool.robot, base_effects(pool.robot))
         names = [*base.names, *(f"{j} {k}" for j in pool.robot.joint_names for k in ("K1", "K3", "D"))]
-        run = delayed(one_seed)
-        results = Parallel(arguments.jobs)(
-            run(pool, seed, Sensors(), name == "jitter") for seed in range(arguments.seeds)
-        )
+        run = partial(one_seed, pool, sensors=Sensors(), springs=name == "jitter")
+        results = each_seed(arguments.keep, name, range(arguments.seeds), run)
         table(title, names, results)
         weightings(pool, results)
-        print(f"\n  {time.perf_counter() - begin:.0f} s")
+        print(f"\n  {time.process_time() - begin:.0f} s of CPU time", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ draws passes at random and adds its own sensor noise. That is what a new experim
 are independent of each other but for the state at their seam, and two hundred of them cost a few minutes, not hours.
 """
 
+import json
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import gettempdir
@@ -50,7 +52,7 @@ class NoisyLoop(VelocityController):
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Exact passes (P, N, n); `loop_noise` is the noise of theta that the controller saw."""
+    """Exact passes (P, N, n); `loop_noise` is the noise of theta that the controller saw, `rate` is in [Hz]."""
 
     robot: Robot
     series: FourierSeries
@@ -59,6 +61,13 @@ class Pool:
     current: np.ndarray
     tau_motor: np.ndarray
     loop_noise: np.ndarray | None = None
+    rate: float = RATE
+
+    def thinned(self, step: int) -> "Pool":
+        """Every so many samples only: as if the sensors had been read less often."""
+        tables = {key: getattr(self, key)[:, ::step] for key in ("q", "theta", "current", "tau_motor")}
+        noise = None if self.loop_noise is None else self.loop_noise[:, ::step]
+        return replace(self, **tables, loop_noise=noise, rate=self.rate / step)
 
     @property
     def truth(self) -> np.ndarray:
@@ -72,13 +81,23 @@ class Pool:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Noise that a seed adds; the first four are standard deviations and resolutions, as `SensorNoise`."""
+    """Noise that a seed adds.
+
+    Attributes:
+        link: standard deviation of q [rad].
+        motor: standard deviation of theta [rad].
+        current: standard deviation of the current [A].
+        quantised: whether the encoders have 17 and 18 bits.
+        colour: correlation time of the noise of the current [s].
+        spikes: share of the samples whose current is off by a hundred times its noise.
+    """
 
     link: float = 2e-5
     motor: float = 1e-5
     current: float = 0.05
     quantised: bool = True
-    correlation: float = 0.0
+    colour: float = 0.0
+    spikes: float = 0.0
 
 
 def make_pool(
@@ -163,9 +182,11 @@ def draw(pool: Pool, seed: int, periods: int, sensors: Sensors) -> Recording:
     seen = sensors.motor * rng.standard_normal(q.shape)
     theta = theta + (seen if pool.loop_noise is None else pool.loop_noise[chosen].reshape(-1, n))
     noise = rng.standard_normal(q.shape)
-    if sensors.correlation:
-        a = sensors.correlation
+    if sensors.colour:
+        a = np.exp(-1.0 / (sensors.colour * pool.rate))
         noise = lfilter([np.sqrt(1.0 - a * a)], [1.0, -a], noise, axis=0)
+    if sensors.spikes:
+        noise = noise + 100.0 * (rng.random(q.shape) < sensors.spikes) * rng.choice([-1.0, 1.0], q.shape)
     current = current + sensors.current * noise
     if sensors.quantised:
         for table, bits in ((q, 17), (theta, 18)):
@@ -175,4 +196,32 @@ def draw(pool: Pool, seed: int, periods: int, sensors: Sensors) -> Recording:
     columns = {}
     for i, name in enumerate(pool.robot.joint_names):
         columns |= {f"q_{name}": q[:, i], f"theta_{name}": theta[:, i], f"current_{name}": current[:, i]}
-    return Recording(np.arange(len(q)) / RATE, columns, f"passes of seed {seed}")
+    return Recording(np.arange(len(q)) / pool.rate, columns, f"passes of seed {seed}")
+
+
+Found = dict[str, tuple[np.ndarray, ...]]
+"""What one seed gives: arrays by label."""
+
+
+def each_seed(path: Path | None, setting: str, seeds: Iterable[int], run: Callable[[int], Found]) -> list[Found]:
+    """Run every seed once and keep what it gave, line by line, so that a run that is cut short goes on where it was.
+
+    Args:
+        path: file of lines of JSON; nothing is kept where None. It belongs to one state of the code.
+        setting: name of the setting, so that one file holds several.
+        seeds: the seeds.
+        run: what a seed gives.
+    """
+    done: dict[int, Found] = {}
+    if path is not None and path.exists():
+        for line in path.read_text().splitlines():
+            entry = json.loads(line)
+            if entry["setting"] == setting:
+                done[entry["seed"]] = {k: tuple(np.array(a) for a in v) for k, v in entry["found"].items()}
+    for seed in (s for s in seeds if s not in done):
+        done[seed] = run(seed)
+        if path is not None:
+            found = {label: [np.asarray(a).tolist() for a in arrays] for label, arrays in done[seed].items()}
+            with path.open("a") as file:
+                file.write(json.dumps({"setting": setting, "seed": seed, "found": found}) + "\n")
+    return [done[s] for s in sorted(set(seeds) & set(done))]
