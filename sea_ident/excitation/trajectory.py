@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from sea_ident.atomic import atomic_file
 from sea_ident.exceptions import ExcitationError, OutputError
 from sea_ident.excitation.result import Excitation
 from sea_ident.motion import Motion
+
+CSV_RATE: Final = 1000.0
+"""Samples per second of a table that a controller plays as it is [Hz]."""
 
 
 def sample_trajectory(excitation: Excitation, rate: float, periods: int = 1) -> Motion:
@@ -69,7 +73,7 @@ def check_sampling(base_frequency: float, harmonics: int, rate: float, periods: 
         raise ExcitationError(f"periods is {periods}; give at least 1")
 
 
-def write_trajectory_csv(excitation: Excitation, path: str | Path, rate: float = 1000.0, periods: int = 1) -> None:
+def write_trajectory_csv(excitation: Excitation, path: str | Path, rate: float = CSV_RATE, periods: int = 1) -> None:
     """Write time, positions, velocities and accelerations of all joints as CSV, in SI units.
 
     The file is complete or is not there. Columns: ``time``, then ``q_<joint>``, ``dq_<joint>``, ``ddq_<joint>``.

@@ -1,5 +1,6 @@
 """`sea-ident excite`: the trajectory that tells most about the parameters."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,10 +8,18 @@ import typer
 
 from sea_ident.cli.inputs import read_robot
 from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, RobotSource, Seed
-from sea_ident.cli.output import best_so_far, check_targets, emit, progress
+from sea_ident.cli.output import best_so_far, check_targets, emit, note, progress
 
 if TYPE_CHECKING:
-    from sea_ident.excitation import Progress
+    from sea_ident.excitation import Excitation, Progress
+    from sea_ident.excitation.joint_trajectory import Storage
+
+
+class BagStorage(StrEnum):
+    """Formats of ROS 2 bags."""
+
+    mcap = "mcap"
+    sqlite3 = "sqlite3"
 
 
 def excite(
@@ -21,15 +30,43 @@ def excite(
     starts: Annotated[int, typer.Option("--starts", help="Random starts; the best is kept.")] = 8,
     seed: Seed = 0,
     jobs: Annotated[int, typer.Option("--jobs", help="Starts at a time; -1: one per core.")] = -1,
+    ramp: Annotated[
+        float | None,
+        typer.Option(
+            "--ramp", metavar="S", help="Begin and end at rest: ramps of at least so long [s], inside limits."
+        ),
+    ] = None,
     csv: Annotated[Path | None, typer.Option("--csv", metavar="T.csv", help="Also write the sampled motion.")] = None,
+    yaml: Annotated[
+        Path | None,
+        typer.Option("--yaml", metavar="T.yaml", help="Also write a ROS 2 JointTrajectory for `ros2 topic pub`."),
+    ] = None,
+    bag: Annotated[
+        Path | None,
+        typer.Option("--bag", metavar="T", help="Also write it as a ROS 2 bag: a new folder, or a .mcap or .db3 file."),
+    ] = None,
+    bag_storage: Annotated[
+        BagStorage, typer.Option("--bag-storage", help="Format inside the folder.")
+    ] = BagStorage.mcap,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate", metavar="HZ", help="Samples per second in T. Default: 1000 in CSV, 100 in ROS messages."
+        ),
+    ] = None,
+    periods: Annotated[int, typer.Option("--periods", help="Whole periods in T.")] = 1,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
     as_json: AsJson = False,
 ) -> None:
     """Design an exciting trajectory inside the limits of a robot. Ctrl-C keeps the best so far."""
-    from sea_ident.excitation import design_excitation
+    from sea_ident.excitation import Ramp, design_excitation
+    from sea_ident.excitation.joint_trajectory import bag_types
 
-    check_targets(out, csv)
+    _check_targets(out, csv, yaml, bag)
+    _check_samples(base_frequency, harmonics, rate, periods, csv is not None, yaml is not None or bag is not None)
+    if bag is not None:
+        bag_types()
     loaded = read_robot(robot, annotation, joints)
     with progress("designing the excitation", starts) as tell, best_so_far():
         ended: set[int] = set()
@@ -45,13 +82,56 @@ def excite(
             harmonics=harmonics,
             starts=starts,
             seed=seed,
+            ramp=None if ramp is None else Ramp(ramp),
             jobs=jobs,
             progress=report,
         )
     designed.save(out)
-    if csv is not None:
-        from sea_ident.excitation import write_trajectory_csv
-
-        write_trajectory_csv(designed, csv)
-    files = [str(path) for path in (out, csv) if path is not None]
+    _write_samples(designed, csv, yaml, bag, bag_storage.value, rate, periods)
+    files = [str(path) for path in (out, csv, yaml, bag) if path is not None]
     emit({**designed.to_dict(), "files": files}, f"{designed.summary()}\nwritten: {', '.join(files)}", as_json=as_json)
+
+
+def _check_targets(out: Path, csv: Path | None, yaml: Path | None, bag: Path | None) -> None:
+    """As `check_targets`; a bag is a folder that is not there yet."""
+    from sea_ident.exceptions import SeaIdentError
+
+    if bag is not None and bag.is_dir():
+        raise SeaIdentError(f"{bag}: exists already; remove it or choose another name")
+    check_targets(out, csv, yaml, bag)
+
+
+def _check_samples(
+    base_frequency: float, harmonics: int, rate: float | None, periods: int, table: bool, messages: bool
+) -> None:
+    """Refuse, before the work begins, what could not be sampled after it."""
+    from sea_ident.excitation.joint_trajectory import RATE
+    from sea_ident.excitation.trajectory import CSV_RATE, check_sampling
+
+    for wanted, default in ((table, CSV_RATE), (messages, RATE)):
+        if wanted:
+            check_sampling(base_frequency, harmonics, default if rate is None else rate, periods)
+
+
+def _write_samples(
+    designed: "Excitation",
+    csv: Path | None,
+    yaml: Path | None,
+    bag: Path | None,
+    storage: "Storage",
+    rate: float | None,
+    periods: int,
+) -> None:
+    """The sampled motion in every form that was asked for."""
+    from sea_ident.excitation import write_trajectory_bag, write_trajectory_csv, write_trajectory_yaml
+    from sea_ident.excitation.joint_trajectory import RATE
+    from sea_ident.excitation.trajectory import CSV_RATE
+
+    if csv is not None:
+        write_trajectory_csv(designed, csv, CSV_RATE if rate is None else rate, periods)
+    if yaml is not None:
+        write_trajectory_yaml(designed, yaml, RATE if rate is None else rate, periods)
+    if bag is not None:
+        write_trajectory_bag(designed, bag, RATE if rate is None else rate, periods, storage=storage)
+    if designed.ramp_out is None and (yaml is not None or bag is not None):
+        note("note: without --ramp the ROS trajectory begins and ends in motion, which most controllers refuse")

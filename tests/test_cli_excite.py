@@ -1,0 +1,149 @@
+"""`sea-ident excite`: the files it writes, what it refuses, and Ctrl-C."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+from sea_ident.excitation import read_excitation, sample_trajectory
+
+QUICK = ("--starts", 1, "--harmonics", 3, "--base-frequency", 0.2)
+
+
+def call(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from sea_ident.cli import main; main()", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, check=False)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("excite")
+    done = call(
+        "excite", "exo_leg", "--out", "e.json", *QUICK, "--ramp", 1.5, "--csv", "t.csv", "--yaml", "t.yaml",
+        "--bag", "bag", "--bag-storage", "sqlite3", "--periods", 2, "--json", cwd=folder,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_everything_asked_for_is_there(written):
+    folder, record = written
+    assert record["files"] == ["e.json", "t.csv", "t.yaml", "bag"]
+    assert sorted(p.name for p in folder.iterdir()) == ["bag", "e.json", "t.csv", "t.yaml"]
+    assert sorted(p.name for p in (folder / "bag").iterdir()) == ["bag.db3", "metadata.yaml"]
+
+
+def test_csv_is_the_trajectory_in_full(written):
+    folder, _ = written
+    excitation = read_excitation(folder / "e.json")
+    with open(folder / "t.csv", newline="") as stream:
+        header, *rows = list(csv.reader(stream))
+    joints = ("hip", "knee", "ankle")
+    assert header == ["time", *(f"{kind}_{joint}" for kind in ("q", "dq", "ddq") for joint in joints)]
+    table = np.array(rows, dtype=float)
+    # 1000 samples per second: two ramps, two periods, and the way on to the phase where the ramp out begins
+    ramps = excitation.ramp_in.duration + excitation.ramp_out.duration
+    on = (excitation.ramp_out.phase - excitation.ramp_in.phase) % excitation.period
+    assert len(table) == pytest.approx(1000.0 * (ramps + 10.0 + on), abs=2)
+    np.testing.assert_allclose(np.diff(table[:, 0]), 1e-3, atol=1e-12)
+    motion = sample_trajectory(excitation, 1000.0, 2)
+    np.testing.assert_array_equal(table, np.column_stack([motion.time, motion.q, motion.dq, motion.ddq]))
+    np.testing.assert_allclose(np.gradient(table[:, 3], 1e-3, edge_order=2), table[:, 6], atol=1e-4)
+
+
+def test_messages_are_the_trajectory_at_a_hundred_points_a_second(written):
+    folder, _ = written
+    motion = sample_trajectory(read_excitation(folder / "e.json"), 100.0, 2)
+    text = yaml.safe_load((folder / "t.yaml").read_text())
+    assert text["joint_names"] == ["hip", "knee", "ankle"]
+    np.testing.assert_array_equal([point["positions"] for point in text["points"]], motion.q)
+    with Reader(folder / "bag") as reader:
+        ((connection, _, raw),) = reader.messages()
+    message = get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr(raw, connection.msgtype)
+    np.testing.assert_array_equal([point.velocities for point in message.points], motion.dq)
+
+
+def test_a_trajectory_that_ends_in_motion_is_told(tmp_path):
+    done = call("excite", "exo_leg", "--out", "e.json", *QUICK, "--yaml", "t.yaml", "--rate", 20, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "without --ramp" in done.stderr
+    assert len(yaml.safe_load((tmp_path / "t.yaml").read_text())["points"]) == 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--csv", "t.csv", "--rate", "1"), "needs more than 1.2"),
+        (("--yaml", "t.yaml", "--periods", "0"), "periods is 0"),
+        (("--bag", "there"), "there: exists already"),
+        (("--bag", "nowhere/bag"), "folder nowhere does not exist"),
+        (("--csv", "e.json"), "two outputs"),
+        (("--bag", "new", "--bag-storage", "zip"), "zip"),
+        (("--ramp", "nan"), "duration of the ramp is nan s"),
+        (("--harmonics", "500"), "not below half the sampling rate"),
+        (("--base-frequency", "nan"), "base_frequency is nan"),
+    ],
+)
+def test_bad_input_is_refused_and_nothing_is_written(tmp_path, arguments, expected):
+    (tmp_path / "there").mkdir()
+    done = call("excite", "exo_leg", "--out", "e.json", *QUICK, *arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert expected in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["there"]
+
+
+# prints a line at a chosen event, for the test to send the signal there
+_AT_A_STEP = (
+    "from sea_ident.excitation import starts\nold = starts._Board.note\n"
+    "def note(board, *args):\n"
+    "    if board.steps:\n        print('now', flush=True)\n"
+    "    return old(board, *args)\n"
+    "starts._Board.note = note\n"
+)
+_BEFORE_ANY = (
+    "import time\nfrom sea_ident.excitation import design\n"
+    "def slow(*_):\n    print('now', flush=True)\n    time.sleep(60)\n"
+    "design.reduced_effects = slow\n"
+)
+
+
+def interrupted(program, *arguments):
+    command = [sys.executable, "-c", program + "from sea_ident.cli import main\nmain()\n", *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "now\n"
+        process.send_signal(2)
+        _, errors = process.communicate(timeout=120)
+    assert "Traceback" not in errors
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_writes_the_best_so_far(tmp_path, jobs):
+    code, errors = interrupted(
+        _AT_A_STEP, "excite", "exo_leg", "--out", tmp_path / "e.json", "--csv", tmp_path / "t.csv",
+        "--starts", 500, "--jobs", jobs, "--ramp", 2,
+    )  # fmt: skip
+    assert code == 0, errors
+    assert "interrupted; this is the best so far" in errors
+    found = read_excitation(tmp_path / "e.json")
+    assert len(found.start_values) < 500
+    assert min(found.margins.values()) >= 0.0
+    assert found.ramp_in is not None
+    assert any("interrupted" in text for text in found.warnings)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["e.json", "t.csv"]
+
+
+def test_ctrl_c_before_there_is_anything_writes_nothing(tmp_path):
+    code, errors = interrupted(_BEFORE_ANY, "excite", "exo_leg", "--out", tmp_path / "e.json")
+    assert code == 130, errors
+    assert not list(tmp_path.iterdir())
