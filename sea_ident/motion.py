@@ -1,6 +1,6 @@
 """Motion of a robot as samples, and as the Fourier series that excites it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,12 @@ class Motion:
         """Consecutive parts of at most `size` samples."""
         for start in range(0, len(self), size):
             yield self[start : start + size]
+
+    @staticmethod
+    def mean(parts: "Sequence[Motion]") -> "Motion":
+        """The mean of motions over the same times."""
+        names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
+        return Motion(parts[0].time, *(np.mean([getattr(part, name) for part in parts], axis=0) for name in names))
 
     @staticmethod
     def concatenate(parts: "list[Motion]") -> "Motion":

@@ -10,8 +10,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
-from sea_ident.discrepancy.data import EquationKind, PeriodData, free_samples, spectrum
-from sea_ident.discrepancy.noise import NoiseFloor, noise_from_periods, stacked
+from sea_ident.discrepancy.data import EquationKind, PeriodData, free_samples, spectrum, towards_mean
+from sea_ident.discrepancy.noise import NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.effects import (
     Anchor,
     Column,
@@ -58,6 +58,7 @@ class Fit:
         scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
         basis: (M, r) orthonormal basis of everything that is free: columns, and tangents of the shapes.
+        directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
         covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
     """
@@ -69,6 +70,7 @@ class Fit:
     scale: FloatArray
     whitened: FloatArray
     basis: FloatArray
+    directions: ComplexArray
     covariance_factor: FloatArray
     free_shapes: tuple[tuple[int, Shape], ...]
 
@@ -121,7 +123,6 @@ class Bench:
         self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
         stride = max(1, int(data.samples / (PERIOD_SAMPLES * data.harmonics)))
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
-        self._period_targets = [spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor]
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
         self.derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
@@ -146,7 +147,8 @@ class Bench:
         none = np.zeros((len(values), 0))
         unit = np.ones(len(self.data.equations))
         flat = stacked(residual)
-        return Fit(effects, columns, values, residual, unit, flat, np.zeros((len(flat), 0)), none, ())
+        nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
+        return Fit(effects, columns, values, residual, unit, flat, np.zeros((len(flat), 0)), nothing, none, ())
 
     def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect within a model."""
@@ -265,14 +267,14 @@ class Bench:
         else:
             assert best is not None
             values, residual, scale, whitened = best
-        flat = whiten(whitener, self._scaled_columns(columns, values, design, residual, scale, noise))
+        directions = self._scaled_columns(columns, values, design, residual, scale, noise)
         shapes = free_shapes(effects) if tangents else ()
         if shapes:
-            directions = self.tangents(effects, columns, values, shapes) * scale[:, None]
-            flat = np.concatenate([flat, whiten(whitener, directions)], axis=1)
-        _, basis, factor = solve(_off(free, flat), whitened)
+            bent = self.tangents(effects, columns, values, shapes) * scale[:, None]
+            directions = np.concatenate([directions, bent], axis=2)
+        _, basis, factor = solve(_off(free, whiten(whitener, directions)), whitened)
         basis = np.concatenate([free, basis], axis=1)
-        return Fit(effects, columns, values, residual, scale, whitened, basis, factor, shapes)
+        return Fit(effects, columns, values, residual, scale, whitened, basis, directions, factor, shapes)
 
     def link_scale(self, columns: Sequence[Column], design: ComplexArray, values: FloatArray) -> FloatArray:
         """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
@@ -520,7 +522,11 @@ class Bench:
     # -- noise -------------------------------------------------------------------------------------------------------
 
     def period_residuals(self, fit: Fit) -> ComplexArray:
-        """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""
+        """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean.
+
+        They are linearised over distances as small as the error of the mean: the noise of one period would carry a
+        velocity across the turn of friction that the mean, P times better known, stays on one side of.
+        """
         data = self.data
         signals = signal_effects(fit.effects)
         bodies = [e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia")]
@@ -528,8 +534,8 @@ class Bench:
         own = np.concatenate(
             [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
         )
-        out = np.empty((data.periods, data.harmonics + 1, len(data.equations)), dtype=np.complex128)
-        for p, (state, body_rows) in enumerate(self._body_rows(signals, tuple(bodies))):
+        predicted = []
+        for state, body_rows in self._body_rows(signals, tuple(bodies)):
             rows = body_rows @ own
             link = rows[:, : self.robot.n].copy()
             motor = rows[:, self.robot.n :].copy()
@@ -542,16 +548,19 @@ class Bench:
             part = Contribution(link, motor)
             for signal in signals:
                 part = signal.shifted(self.robot, state.motion.time, part)
-            out[p] = fit.scale * (self._period_targets[p] - spectrum(data.rows(part), data.harmonics))
-        return out
+            predicted.append(spectrum(data.rows(part), data.harmonics))
+        changes = (np.stack(predicted[1:]) - predicted[0]) * np.sqrt(data.periods)
+        targets = np.stack([spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor])
+        return np.asarray(fit.scale * (fit.residual + targets - targets.mean(axis=0) - changes), dtype=np.complex128)
 
     def _body_rows(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> list[tuple[State, FloatArray]]:
-        """State and rows (N', 2 n, k) of bodies and rotors for every period, at fewer samples."""
+        """State and rows (N', 2 n, k) of bodies and rotors of the mean, then of every period, at fewer samples."""
         if signals not in self._period_bodies:
             if len(self._period_bodies) > 3:
                 self._period_bodies.clear()
             found = []
-            for motion in self.data.period_motions:
+            mean, near = towards_mean(self.data.period_motions, 1.0 / np.sqrt(self.data.periods))
+            for motion in (mean, *near):
                 thin = corrected_motion(self.robot, signals, motion)[:: self._stride]
                 state = State(self.robot, thin, _thinned(self.data.channels, self._stride))
                 parts = [body.evaluate(state) for body in bodies]
@@ -567,7 +576,12 @@ class Bench:
 
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor with the parameters of a fit."""
-        return noise_from_periods(self.period_residuals(fit))
+        residuals = self.period_residuals(fit)
+        plain = noise_from_periods(residuals)
+        whitener = plain.whitener()
+        free = self.free_basis(plain)
+        taken = solve(_off(free, whiten(whitener, fit.directions)), np.zeros(len(free)))[1]
+        return noise_beside_model(residuals, plain, np.concatenate([free, taken], axis=1))
 
     def with_remainder(self, noise: NoiseFloor, share: float) -> NoiseFloor:
         """The noise floor raised by a share of the torque, frequency by frequency, for what a model does not have."""

@@ -1,6 +1,6 @@
 """A recording as periods of equations: what every comparison of model and data starts from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -115,6 +115,17 @@ class PeriodData:
             if equation.kind is not EquationKind.LINK:
                 out[:, e] = tau_motor[:, equation.index]
         return out
+
+
+def towards_mean(motions: Sequence[Motion], share: float) -> tuple[Motion, tuple[Motion, ...]]:
+    """The mean of several motions, and every one of them with only a share of its distance from that mean."""
+    mean = Motion.mean(motions)
+    names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
+    near = (
+        Motion(mean.time, *(getattr(mean, n) + share * (getattr(m, n) - getattr(mean, n)) for n in names))
+        for m in motions
+    )
+    return mean, tuple(near)
 
 
 def equation_rows(equations: tuple[Equation, ...], part: Contribution) -> FloatArray:

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
@@ -21,11 +20,12 @@ from sea_ident.discrepancy.diagnosis import (
     Waveforms,
 )
 from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, Settled, needed_share, own_torque, search, settle_again
+from sea_ident.discrepancy.search import Selection, needed_share, own_torque, search, settle_again
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.signal import SignalEffect
@@ -114,8 +114,8 @@ def diagnose(
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:
-    """Effects of a model with its springs among them."""
-    return (*model.effects, *spring_effects(model.robot)) if model.robot.elastic_indices.size else model.effects
+    """Effects of a model with its springs, and what else is in them, among them."""
+    return (*model.effects, *spring_effects(model.robot), *model.spring_effects)
 
 
 def _period_of(model: Model, recording: Recording | ProcessedRecording) -> float | None:
@@ -164,14 +164,6 @@ def _held_out(
     now = settle_again(other, after)
     transfers = assess.transfer(other, selection, now) if selection.added else []
     return HeldOut(other, before, after, other.noise(after), transfers, processed.source, True)
-
-
-def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
-    """Statistic of a fit in the noise alone, its degrees of freedom, and the probability of as much by noise."""
-    plain = settled.noise.with_remainder(np.zeros_like(settled.noise.remainder))
-    statistic, dof = bench.statistic(settled.fit, plain), settled.fit.dof
-    freedom = plain.total_freedom * plain.equations
-    return statistic, dof, float(stats.f.sf(statistic / dof, dof, freedom))
 
 
 def _conclude(
@@ -358,4 +350,4 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
     )
 
 
-__all__ = ["DiagnosisError", "HeldOut", "PeriodData", "diagnose", "lack_of_fit", "model_effects", "replace"]
+__all__ = ["DiagnosisError", "HeldOut", "PeriodData", "diagnose", "model_effects", "replace"]

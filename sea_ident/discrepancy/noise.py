@@ -12,6 +12,9 @@ ComplexArray = NDArray[np.complex128]
 SMALLEST_HALF_WIDTH = 4
 """Noise is smoothed over at least this many harmonics to either side."""
 
+SMALLEST_REST = 0.1
+"""A residual of which a model takes up more than all but this share says nothing about noise."""
+
 
 @dataclass(frozen=True, eq=False)
 class NoiseFloor:
@@ -66,13 +69,14 @@ def stacked(values: ComplexArray) -> FloatArray:
     return np.concatenate([values[0].real, rest.real, rest.imag])
 
 
-def noise_from_periods(residuals: ComplexArray) -> NoiseFloor:
+def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = None) -> NoiseFloor:
     """Covariance of the mean residual from successive differences of the periods.
 
     Differences, and not distances from the mean, so that a drift over the recording does not count as noise.
 
     Args:
         residuals: (P, H + 1, E) residuals of every period from its own signals.
+        leverage: (H + 1, E) share of the residuals that was projected out of them; none by default.
 
     Returns:
         The noise floor.
@@ -87,6 +91,11 @@ def noise_from_periods(residuals: ComplexArray) -> NoiseFloor:
     half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * count / each - 1.0) / 2.0)))
     half = min(half, max((harmonics - 1) // 2, 1))
     smooth = _moving_mean(products, half)
+    left = 1.0
+    if leverage is not None:
+        kept = np.sqrt(np.maximum(1.0 - _moving_mean(leverage.astype(np.complex128), half).real, SMALLEST_REST))
+        smooth = smooth / (kept[:, :, None] * kept[:, None, :])
+        left = float(np.mean(kept**2))
     # a constant that wanders more than its neighbours has a floor of its own
     ratio = np.real(np.einsum("ee->e", products[0])) / np.real(np.einsum("ee->e", smooth[0]))
     inflate = np.sqrt(np.where(ratio > 4.0, ratio, 1.0))
@@ -97,9 +106,43 @@ def noise_from_periods(residuals: ComplexArray) -> NoiseFloor:
         covariance=smooth / periods,
         remainder=np.zeros((harmonics, count)),
         periods=periods,
-        freedom=each * (2 * half + 1),
-        total_freedom=each * 2.0 * harmonics,
+        freedom=each * (2 * half + 1) * left,
+        total_freedom=each * 2.0 * harmonics * left,
     )
+
+
+def unstacked(values: FloatArray, equations: int) -> ComplexArray:
+    """(H + 1, E, ...) complex coefficients from real numbers: the inverse of `stacked`."""
+    rest = (len(values) - equations) // 2
+    first, real, imaginary = np.split(values, [equations, equations + rest])
+    shape = (rest // equations, equations, *values.shape[1:])
+    return np.concatenate([first[None].astype(np.complex128), (real + 1j * imaginary).reshape(shape)])
+
+
+def noise_beside_model(residuals: ComplexArray, plain: NoiseFloor, basis: FloatArray) -> NoiseFloor:
+    """Noise floor of what a fit leaves: the part of the scatter that it takes up is not in it.
+
+    Friction that differs from pass to pass gathers around reversals. Samples left out and columns of friction take
+    most of it up in the mean residual, so it must not count as noise of what remains.
+
+    Args:
+        residuals: (P, H + 1, E) residuals of every period.
+        plain: noise floor of the residuals as they are.
+        basis: (M, r) orthonormal basis of everything that is free, whitened by `plain`.
+
+    Returns:
+        The noise floor.
+    """
+    whitener, count = plain.whitener(), plain.equations
+    flat = np.stack([stacked(np.matmul(whitener, r[:, :, None])[:, :, 0]) for r in residuals])
+    flat = flat - (flat @ basis) @ basis.T
+    share = unstacked(np.sum(basis**2, axis=1), count)
+    leverage = share.real.copy()
+    leverage[1:] = (share[1:].real + share[1:].imag) / 2.0
+    inside = noise_from_periods(np.stack([unstacked(f, count) for f in flat]), leverage)
+    colour = np.linalg.inv(whitener)
+    covariance = np.matmul(np.matmul(colour, inside.covariance), colour.conj().transpose(0, 2, 1))
+    return replace(inside, covariance=covariance, remainder=plain.remainder)
 
 
 def _moving_mean(values: ComplexArray, half: int) -> ComplexArray:

@@ -35,7 +35,11 @@ LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
 
 FAR = 3.0
-"""Statistic over degrees of freedom beyond which shapes are left alone: they would bend to the misfit."""
+"""Statistic over degrees of freedom beyond which the shapes of the model are left alone, for they would bend to the
+misfit, ..."""
+
+BENT = 0.3
+"""... unless that leaves less than this share of the excess: then they were what is wrong."""
 
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
@@ -117,9 +121,12 @@ def settle_again(bench: Bench, fit: Fit) -> Settled:
     share = needed_share(bench, fit, plain, TOLERATED) if TOLERATED else 0.0
     noise = bench.with_remainder(plain, share)
     anchored = bench.anchored(fit.effects, fit.parameters)
-    far = bench.statistic(fit, noise) > FAR * fit.dof
-    only = len(bench.effects) if far else 0
-    return Settled(bench.refine(anchored, noise, start=fit.parameters, only=only), noise, share)
+    bent = bench.refine(anchored, noise, start=fit.parameters)
+    if bent.statistic > FAR * bent.dof:
+        straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
+        if bent.excess > BENT * straight.excess:
+            return Settled(straight, noise, share)
+    return Settled(bent, noise, share)
 
 
 def needed_share(bench: Bench, fit: Fit, noise: NoiseFloor, ratio: float) -> float:

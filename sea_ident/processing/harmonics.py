@@ -84,3 +84,34 @@ def differentiate(values: FloatArray, period: float, harmonics: int) -> tuple[Fl
     for order in range(3):
         parts.append(np.fft.irfft(coefficients * factor**order, samples, axis=-2))
     return parts[0], parts[1], parts[2]
+
+
+def differentiate_periods(
+    stack: FloatArray, period: float, harmonics: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Every period filtered and differentiated like the mean.
+
+    The mean is a Fourier series. What a period differs by from it is not periodic: a series fitted to it alone would
+    jump at both of its ends, and its derivatives with it. So the differences are laid end to end, over the whole
+    recording, and a line takes up what they differ by between its ends.
+
+    Args:
+        stack: (P, N, n) positions of consecutive periods.
+        period: [s].
+        harmonics: L, at most (N - 1) // 2.
+
+    Returns:
+        Positions, velocities and accelerations, each (P, N, n).
+    """
+    periods, samples, joints = stack.shape
+    centre = stack.mean(axis=0)
+    means = differentiate(centre, period, harmonics)
+    rest = (stack - centre).reshape(periods * samples, joints)
+    slope = (rest[-1] - rest[0]) / max(len(rest) - 1, 1)
+    line = np.outer(np.arange(len(rest)) - 0.5 * (len(rest) - 1), slope)
+    parts = list(
+        differentiate(rest - line, periods * period, int((min(harmonics, (samples - 1) // 2) + 0.5) * periods))
+    )
+    parts[0] = parts[0] + line
+    parts[1] = parts[1] + slope * samples / period
+    return tuple(mean + part.reshape(stack.shape) for mean, part in zip(means, parts, strict=True))  # type: ignore[return-value]

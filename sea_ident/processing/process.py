@@ -229,12 +229,8 @@ def _periodic(
                 f"{recording.source}: {label} is {number}; {cut.samples} samples allow 1 .. {(cut.samples - 1) // 2}"
             )
     time: FloatArray = np.arange(cut.samples, dtype=np.float64) * (period / cut.samples)
-    motion = _motion(time, period, cuts["q"].mean(axis=0), cuts["theta"].mean(axis=0), links, motors, elastic)
-    parts: tuple[Motion, ...] = ()
-    if count > 1:
-        parts = tuple(
-            _motion(time, period, cuts["q"][p], cuts["theta"][p], links, motors, elastic) for p in range(count)
-        )
+    parts = _motions(time, period, cuts["q"], cuts["theta"], links, motors, elastic)
+    motion = Motion.mean(parts)
     factor = torque.transmitted(cuts["torque"].mean(axis=0), signals.torque.efficiency, motion.dtheta)
     tau = cuts["torque"] * factor
     if count > 1:
@@ -252,7 +248,7 @@ def _periodic(
         raw_tau_variance=raw,
         periods=count,
         period=float(period),
-        period_motions=parts,
+        period_motions=parts if count > 1 else (),
         period_tau_motor=tau,
         channels={name: cuts[name].mean(axis=0) for name in signals.others},
         link_harmonics=int(links),
@@ -296,7 +292,7 @@ def _check_periodicity(source: str, robot: Robot, stack: FloatArray, period: flo
             )
 
 
-def _motion(
+def _motions(
     time: FloatArray,
     period: float,
     q: FloatArray,
@@ -304,13 +300,15 @@ def _motion(
     links: int,
     motors: int,
     elastic: np.typing.NDArray[np.intp],
-) -> Motion:
-    q, dq, ddq = harmonics.differentiate(q, period, links)
-    motor = [q.copy(), dq.copy(), ddq.copy()]
+) -> tuple[Motion, ...]:
+    """Motions (P,) from positions (P, N, n) of consecutive periods."""
+    link = harmonics.differentiate_periods(q, period, links)
+    motor = [part.copy() for part in link]
     if elastic.size:
-        for whole, part in zip(motor, harmonics.differentiate(theta[:, elastic], period, motors), strict=True):
-            whole[:, elastic] = part
-    return Motion(time, q, dq, ddq, *motor)
+        found = harmonics.differentiate_periods(theta[:, :, elastic], period, motors)
+        for whole, part in zip(motor, found, strict=True):
+            whole[:, :, elastic] = part
+    return tuple(Motion(time, *(part[p] for part in (*link, *motor))) for p in range(len(q)))
 
 
 def _not_periodic(
