@@ -2,10 +2,8 @@
 
 import warnings as python_warnings
 
-import numpy as np
-
 from sea_ident.discrepancy.bench import Fit
-from sea_ident.effects import Effect, Side
+from sea_ident.effects import Side, spring_effects
 from sea_ident.estimation import Model, identify
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
@@ -22,20 +20,11 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
     Returns:
         A model like any other.
     """
-    effects = tuple(effect for effect in fit.effects if effect.side is not Side.SPRING)
+    law = set(spring_effects(model.robot))
+    effects = tuple(effect for effect in fit.effects if effect.side is not Side.SPRING or effect not in law)
     try:
         with python_warnings.catch_warnings():
             python_warnings.simplefilter("ignore", SeaIdentWarning)
             return identify(model.robot, processed, effects=effects)
     except SeaIdentError:
         return None
-
-
-def spring_additions(model: Model, fit: Fit) -> tuple[tuple[Effect, tuple[float, ...]], ...]:
-    """Effects in the springs that were found, with their values: they cancel in the motor torque of a model."""
-    own = {"spring_stiffness", "spring_stiffening", "spring_damping"}
-    return tuple(
-        (e, tuple(float(np.float64(fit.parameters[c.name])) for c in e.columns(model.robot)))
-        for e in fit.effects
-        if e.side is Side.SPRING and e.name not in own
-    )

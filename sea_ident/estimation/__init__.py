@@ -19,7 +19,7 @@ from sea_ident.estimation.model_file import model_from_dict, read_model
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.one_shot import identify_one_shot
 from sea_ident.estimation.physical import Box, PhysicalParameters, Pull, physical_parameters
-from sea_ident.estimation.springs import SpringResult, Verdict, identify_springs
+from sea_ident.estimation.springs import SpringResult, SpringTerm, Verdict, identify_springs
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update, updated
 
@@ -44,6 +44,7 @@ __all__ = [
     "Pull",
     "Robust",
     "SpringResult",
+    "SpringTerm",
     "Uncertainty",
     "Update",
     "Verdict",

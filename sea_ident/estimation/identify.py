@@ -9,15 +9,17 @@ import scipy.linalg
 
 from sea_ident._typing import FloatArray
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
-from sea_ident.effects import Effect, base_effects
+from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.base import Side
 from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
+from sea_ident.estimation.separability import unseparated_friction
 from sea_ident.estimation.solve import condition_number, solve_weighted
-from sea_ident.estimation.springs import springs_from
+from sea_ident.estimation.springs import Verdict, springs_from
 from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
 from sea_ident.estimation.update import updated
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
@@ -35,6 +37,9 @@ SLOW = 0.01
 
 DENSE = 200 * 2**20
 """Bytes of regressor beyond which one stretch is reduced piece by piece."""
+
+UNSAFE = (Verdict.CIRCULAR, Verdict.NOT_EXCITED)
+"""Verdicts on springs of which a user is warned."""
 
 EXCERPT = 500
 """Samples of the mean period that a model keeps."""
@@ -57,8 +62,9 @@ def identify(
     Args:
         robot: the robot.
         recording: what was measured, as it was read or already processed.
-        effects: the model; bodies, rotors, viscous and Coulomb friction of every motor where None. Springs are
-            identified in the second step and are not to be given here.
+        effects: the model; bodies, rotors, viscous and Coulomb friction of every motor where None. Every spring is
+            identified in the second step by its stiffness, cubic stiffness and damping, which are not to be given
+            here; further effects in a spring (hysteresis, play, an offset) may be, and are fitted together with these.
         estimator: how; where None, the paper's weighting per sample, smoothed, with instruments from other periods
             against noise in the regressor where there are at least two periods.
         period: [s], of a recording that is not processed yet; found from the data where None.
@@ -85,15 +91,14 @@ def identify(
             f"{processed.source} was processed for the joints {', '.join(processed.joint_names)}; {robot.name} has "
             f"{', '.join(robot.joint_names)}"
         )
-    chosen = default_effects(robot, processed) if effects is None else tuple(effects)
-    _refuse_springs(robot, chosen)
+    chosen, in_springs = _split_springs(default_effects(robot, processed) if effects is None else tuple(effects))
     how = default_estimator(processed) if estimator is None else estimator
     found: list[str] = list(processed.warnings)
     first = len(found)
     base, lost = visible_parameters(robot, chosen, processed)
     found.extend(lost)
     observations = Observations(robot, chosen, base, processed)
-    if processed.periods == 1 and processed.samples * robot.n * base.rank * 8 > DENSE:
+    if processed.periods == 1 and processed.samples * robot.n * base.rank * 8 > DENSE and not in_springs:
         model, more = identify_long(observations, how, unknown_zero)
         return _reported(model, [*found, *more], first, processed.notes)
     estimate = how.estimate(observations)
@@ -103,8 +108,9 @@ def identify(
     model = _model(observations, estimate, uncertainty, how.name)
     if prior is not None:
         model = _refitted(updated(model, prior), observations)
-    springs = springs_from(observations, model.values, model.uncertainty, unknown_zero)
-    found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict == "circular")
+    springs = springs_from(observations, model.values, model.uncertainty, unknown_zero, in_springs)
+    found.extend(unseparated_friction(base, model.values, model.uncertainty))
+    found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict in UNSAFE)
     model = replace(model, springs=springs)
     return _reported(model, found, first, (*processed.notes, *estimate.notes))
 
@@ -185,13 +191,27 @@ def _thinned(motion: Motion, samples: int) -> Motion:
     return motion[:: max(1, len(motion) // samples)]
 
 
-def _refuse_springs(robot: Robot, effects: tuple[Effect, ...]) -> None:
+def _split_springs(effects: tuple[Effect, ...]) -> tuple[tuple[Effect, ...], tuple[JointEffect, ...]]:
+    """Effects that the motor torque shows, and those in springs, which cancel in it.
+
+    Raises:
+        IdentificationError: one is part of the law of every spring, changes in time, or stands at no single joint.
+    """
+    inside = []
     for effect in effects:
-        if effect.side is Side.SPRING:
+        if effect.side is not Side.SPRING:
+            continue
+        law = effect.name in ("spring_stiffness", "spring_damping") or (
+            effect.name == "spring_stiffening" and effect.shape_values["exponent"] == 3.0
+        )
+        if law or isinstance(effect, TrendEffect) or not isinstance(effect, JointEffect):
+            reason = "is part of the law of every spring" if law else "is none that one mean period shows"
             raise IdentificationError(
                 f"the effect {effect.name!r} acts in a spring, which the motor torque does not show (it cancels in the "
-                "sum of link and motor rows); springs are identified in the second step: leave it out"
+                f"sum of link and motor rows), and {reason}: leave it out"
             )
+        inside.append(effect)
+    return tuple(effect for effect in effects if effect.side is not Side.SPRING), tuple(inside)
 
 
 def _check_signs(observations: Observations) -> list[str]:

@@ -103,7 +103,7 @@ class Model:
         uncertainty: covariance from the spread between periods, with its degrees of freedom.
         information: (b, b) F' Sigma^-1 F of this recording.
         estimator: name of the estimator.
-        springs: one result for every elastic joint.
+        springs: one result for every elastic joint, with further effects in it where the model has some.
         fit: how well it fits.
         excerpt: thinned data.
         recording: where the data came from.
@@ -160,9 +160,17 @@ class Model:
         half = self.uncertainty.half_width(level)
         return self.values - half, self.values + half
 
+    @property
+    def spring_effects(self) -> tuple[Effect, ...]:
+        """Effects in the springs beyond stiffness, cubic stiffness and damping; the motor torque does not show them."""
+        return tuple(term.effect for spring in self.springs for term in spring.terms)
+
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Rotor inertias, friction and every other effect's parameters that the data tell apart from the bodies."""
+        """Rotor inertias, friction and every other effect's parameters that the data tell apart from the bodies.
+
+        Those of further effects in the springs follow those of the motor torque.
+        """
         from sea_ident.regressor import prior_parameters
 
         prior = prior_parameters(self.robot, self.effects)
@@ -183,6 +191,9 @@ class Model:
                     prior=known if np.isfinite(known) else None,
                 )
             )
+        for term in (term for spring in self.springs for term in spring.terms):
+            for column, value, std in zip(term.effect.columns(self.robot), term.values, term.stds, strict=True):
+                found.append(Parameter(column.name, column.joint, column.effect, value, std, column.unit, None))
         return tuple(found)
 
     def predict(self, motion: Motion, channels: Mapping[str, FloatArray] | None = None) -> FloatArray:

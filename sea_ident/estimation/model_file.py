@@ -12,9 +12,9 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.atomic import atomic_file
 from sea_ident.base_parameters import BaseParameters
-from sea_ident.effects import effect_from_dict
+from sea_ident.effects import Side, effect_from_dict
 from sea_ident.estimation.model import Excerpt, Fit, Model
-from sea_ident.estimation.springs import SpringResult, Verdict
+from sea_ident.estimation.springs import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update
 from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError
@@ -24,6 +24,9 @@ from sea_ident.robot import Robot, robot_from_text
 
 FORMAT = "sea_ident model"
 VERSION = 1
+VERSION_WITH_SPRING_EFFECTS = 2
+"""Of models that hold more in a spring than stiffness and damping; others are written as before."""
+
 LARGEST_FILE = 256 * 2**20
 
 
@@ -35,10 +38,10 @@ def model_to_dict(model: Model) -> dict[str, Any]:
     half = model.uncertainty.half_width()
     return {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION_WITH_SPRING_EFFECTS if model.spring_effects else VERSION,
         "robot": robot.name,
         "joints": list(names),
-        "effects": [effect.to_dict() for effect in model.effects],
+        "effects": [effect.to_dict() for effect in (*model.effects, *model.spring_effects)],
         "estimator": model.estimator,
         "recording": model.recording,
         "fit": {
@@ -142,9 +145,10 @@ def read_model(path: str | Path) -> Model:
         raise ModelFileError(f"{path}: is not JSON: {error}; is it a MODEL.json, whole?") from None
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise ModelFileError(f"{path}: is not a model of sea_ident; identify writes one")
-    if record.get("version") != VERSION:
+    if record.get("version") not in (VERSION, VERSION_WITH_SPRING_EFFECTS):
         raise ModelFileError(
-            f"{path}: has version {record.get('version')!r}; this version of sea_ident reads {VERSION}. Identify again"
+            f"{path}: has version {record.get('version')!r}; this version of sea_ident reads {VERSION} and "
+            f"{VERSION_WITH_SPRING_EFFECTS}. Identify again"
         )
     try:
         return model_from_dict(record)
@@ -170,7 +174,12 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
     )
     if list(robot.joint_names) != record["joints"]:
         raise ModelFileError(f"joints are {record['joints']}, but the description has {list(robot.joint_names)}")
-    effects = tuple(effect_from_dict(entry) for entry in record["effects"])
+    springs = tuple(_spring_from_dict(entry, robot) for entry in record["springs"])
+    listed = tuple(effect_from_dict(entry) for entry in record["effects"])
+    effects = tuple(effect for effect in listed if effect.side is not Side.SPRING)
+    in_springs = tuple(effect for effect in listed if effect.side is Side.SPRING)
+    if set(in_springs) != {term.effect for spring in springs for term in spring.terms}:
+        raise ModelFileError("the effects in springs differ from the terms of the springs")
     columns = model_columns(robot, effects)
     names = [column.name for column in columns]
     saved = record["base"]
@@ -206,7 +215,7 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
         ),
         information=_array(record["information"], (rank, rank), "information"),
         estimator=str(record["estimator"]),
-        springs=tuple(_spring_from_dict(entry) for entry in record["springs"]),
+        springs=springs,
         fit=Fit(
             rms_residual=_from_joints(fit["rms_residual"], robot),
             noise_std=_from_joints(fit["noise_std"], robot),
@@ -250,7 +259,17 @@ def _array(values: Any, shape: tuple[int, ...], where: str) -> FloatArray:
 
 def _spring_to_dict(spring: SpringResult) -> dict[str, Any]:
     stiffness, cubic, damping = spring.law
+    more: dict[str, Any] = {}
+    if spring.terms:
+        more = {
+            "terms": [
+                {"effect": term.effect.to_dict(), "values": list(term.values), "stds": list(term.stds)}
+                for term in spring.terms
+            ],
+            "full_covariance": [list(row) for row in spring.full_covariance],
+        }
     return {
+        **more,
         "joint": spring.joint,
         "stiffness": spring.stiffness,
         "stiffness_std": spring.stiffness_std,
@@ -273,18 +292,38 @@ def _spring_to_dict(spring: SpringResult) -> dict[str, Any]:
     }
 
 
-def _spring_from_dict(entry: Mapping[str, Any]) -> SpringResult:
-    other = ("law", "verdict", "covariance", "degrees_of_freedom", "joint", "note", "held_out")
+def _spring_from_dict(entry: Mapping[str, Any], robot: Robot) -> SpringResult:
+    numbers = (
+        "stiffness", "stiffness_std", "cubic_stiffness", "cubic_stiffness_std", "damping", "damping_std",
+        "linear_stiffness", "linear_damping", "zero", "rms_residual", "rms_torque", "largest_deflection",
+    )  # fmt: skip
     freedom = entry["degrees_of_freedom"]
+    terms = tuple(_term_from_dict(term, str(entry["joint"]), robot) for term in entry.get("terms", ()))
+    size = 3 + sum(len(term.values) for term in terms)
+    whole: list[list[float]] = []
+    if terms:
+        whole = _array(entry["full_covariance"], (size, size), f"springs.{entry['joint']}.full_covariance").tolist()
     return SpringResult(
-        **{key: float(value) for key, value in entry.items() if key not in other},
+        **{key: float(entry[key]) for key in numbers},
         joint=str(entry["joint"]),
         note=str(entry["note"]),
         held_out={str(key): float(value) for key, value in entry["held_out"].items()},
         verdict=Verdict(entry["verdict"]),
         covariance=tuple(tuple(float(v) for v in row) for row in entry["covariance"]),
         degrees_of_freedom=math.inf if freedom is None else float(freedom),
+        terms=terms,
+        full_covariance=tuple(tuple(row) for row in whole),
     )
+
+
+def _term_from_dict(record: Mapping[str, Any], joint: str, robot: Robot) -> SpringTerm:
+    effect = effect_from_dict(record["effect"])
+    if effect.side is not Side.SPRING or effect.joint != joint:
+        raise ModelFileError(f"the spring of {joint!r} cannot hold the effect {effect.name!r} at {effect.joint!r}")
+    count = len(effect.columns(robot))
+    where = f"springs.{joint}.{effect.name}"
+    values, stds = (_array(record[key], (count,), f"{where}.{key}") for key in ("values", "stds"))
+    return SpringTerm(effect, tuple(values.tolist()), tuple(stds.tolist()))
 
 
 def _update_to_dict(update: Update) -> dict[str, Any]:

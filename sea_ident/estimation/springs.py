@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
+from sea_ident.effects import Effect, JointEffect
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty, student_factor
 from sea_ident.exceptions import IdentificationError
@@ -29,6 +30,21 @@ CIRCULAR = 1e-3
 
 SUPPORT = 1e-3
 """Significance that a term beyond the linear spring needs."""
+
+
+@dataclass(frozen=True)
+class SpringTerm:
+    """An effect in a spring beyond its law: hysteresis, play, an offset.
+
+    Attributes:
+        effect: the effect, with its shape.
+        values: (k,) values of its columns.
+        stds: (k,) their standard deviations, its shape held.
+    """
+
+    effect: Effect
+    values: tuple[float, ...]
+    stds: tuple[float, ...]
 
 
 class Verdict(StrEnum):
@@ -67,6 +83,8 @@ class SpringResult:
         largest_deflection: [rad].
         held_out: rms on held-out pieces of the period by law [N m].
         note: reason of the verdict, in words.
+        terms: further effects in the spring, fitted together with the law.
+        full_covariance: (3 + k, 3 + k) of K1, K3, D and the values of all terms; empty without terms.
     """
 
     joint: str
@@ -87,11 +105,16 @@ class SpringResult:
     largest_deflection: float
     held_out: dict[str, float]
     note: str
+    terms: tuple[SpringTerm, ...] = ()
+    full_covariance: tuple[tuple[float, ...], ...] = ()
 
     @property
     def law(self) -> tuple[float, float, float]:
-        """K1, K3, D that the data support: K3 is zero unless it is supported."""
-        if self.verdict is Verdict.LINEAR:
+        """K1, K3, D that the data support: K3 is zero unless it is supported.
+
+        Beside other terms all three are as they were fitted together with them.
+        """
+        if self.verdict is Verdict.LINEAR and not self.terms:
             return self.linear_stiffness, 0.0, max(self.linear_damping, 0.0)
         return self.stiffness, self.cubic_stiffness, max(self.damping, 0.0)
 
@@ -102,9 +125,14 @@ class SpringResult:
 
     def summary(self) -> str:
         """One line."""
+        more = "".join(
+            f", {term.effect.name} "
+            + " ".join(f"{v:.4g} +- {s:.2g}" for v, s in zip(term.values, term.stds, strict=True))
+            for term in self.terms
+        )
         return (
             f"{self.joint}: K1 {self.stiffness:.5g} +- {self.stiffness_std:.2g}, K3 {self.cubic_stiffness:.4g} +- "
-            f"{self.cubic_stiffness_std:.2g}, D {self.damping:.4g} +- {self.damping_std:.2g}; {self.verdict}: "
+            f"{self.cubic_stiffness_std:.2g}, D {self.damping:.4g} +- {self.damping_std:.2g}{more}; {self.verdict}: "
             f"{self.note}"
         )
 
@@ -120,24 +148,40 @@ def identify_springs(
         unknown_zero: joints whose encoders of theta and q have different, unknown zeros; the difference is fitted.
 
     Returns:
-        One result for every elastic joint, in the order of the robot.
+        One result for every elastic joint, in the order of the robot, with the further effects that the model has in
+        its springs.
 
     Raises:
         IdentificationError: the spring torque cannot be computed.
         RobotError: `unknown_zero` names a joint that is no elastic joint.
     """
     observations = Observations(model.robot, model.effects, model.base, processed)
-    return springs_from(observations, model.values, model.uncertainty, unknown_zero)
+    inside = tuple(effect for effect in model.spring_effects if isinstance(effect, JointEffect))
+    return springs_from(observations, model.values, model.uncertainty, unknown_zero, inside)
 
 
 def springs_from(
-    observations: Observations, values: FloatArray, uncertainty: Uncertainty, unknown_zero: Sequence[str] = ()
+    observations: Observations,
+    values: FloatArray,
+    uncertainty: Uncertainty,
+    unknown_zero: Sequence[str] = (),
+    effects: Sequence[JointEffect] = (),
 ) -> tuple[SpringResult, ...]:
-    """As `identify_springs`, from observations and the (b,) base parameters found from them."""
+    """As `identify_springs`, from observations and the (b,) base parameters found from them.
+
+    Args:
+        observations: the recording.
+        values: (b,) base parameters.
+        uncertainty: of the base parameters.
+        unknown_zero: joints with unknown zeros.
+        effects: what else is in the springs.
+    """
     robot, processed = observations.robot, observations.processed
     elastic = robot.elastic_indices
     for name in unknown_zero:
         robot.spring(name)
+    for effect in effects:
+        robot.spring(effect.required_joint)
     if not elastic.size:
         return ()
     if observations.spring_side is SpringSide.NONE:
@@ -159,7 +203,15 @@ def springs_from(
         name = robot.joint_names[joint]
         own = None if per_period is None else [(motion, torque[:, k]) for motion, torque in per_period]
         data = _SpringData(
-            name, int(joint), processed.motion, tau[:, k], observations.mean.spring[:, k], own, uncertainty
+            name,
+            int(joint),
+            processed.motion,
+            tau[:, k],
+            observations.mean.spring[:, k],
+            own,
+            uncertainty,
+            tuple(effect for effect in effects if effect.joint == name),
+            tuple(len(effect.columns(robot)) for effect in effects if effect.joint == name),
         )
         result = _one_spring(data, name in unknown_zero)
         channels = processed.channels
@@ -195,6 +247,15 @@ class _SpringData:
     rows: FloatArray
     per_period: list[tuple[Motion, FloatArray]] | None
     uncertainty: Uncertainty
+    effects: tuple[JointEffect, ...] = ()
+    widths: tuple[int, ...] = ()
+
+    def columns(self, motion: Motion, zero: float) -> FloatArray:
+        """(N, 3 + k) columns of K1, K3, D and of the other effects."""
+        i = self.joint
+        state = (motion.q[:, i], motion.dq[:, i], motion.theta[:, i] - zero, motion.dtheta[:, i])
+        more = [effect.local_columns(*state) for effect in self.effects]
+        return np.column_stack([_columns(motion, i, zero), *more])
 
 
 def circular_factor(deflections: Sequence[FloatArray], torques: Sequence[FloatArray]) -> float | None:
@@ -251,24 +312,31 @@ def _fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
 def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
     name, joint, motion, tau = data.name, data.joint, data.motion, data.tau
     zero = _fit_zero(motion, joint, tau) if unknown_zero else 0.0
-    columns = _columns(motion, joint, zero)
-    scale = np.linalg.norm(columns, axis=0)
-    if np.any(scale == 0.0):
+    whole = data.columns(motion, zero)
+    columns, count = whole[:, :3], whole.shape[1]
+    scale = np.linalg.norm(whole, axis=0)
+    if np.any(scale[:3] == 0.0):
         raise IdentificationError(
             f"joint {name!r}: the deflection theta - q is zero throughout; there is no spring in this data"
         )
+    if np.any(scale == 0.0):
+        raise IdentificationError(
+            f"joint {name!r}: this motion does not show {', '.join(e.name for e in data.effects)} in its spring; leave "
+            "it out"
+        )
     extra = np.zeros((len(tau), 0))
     if unknown_zero:
-        guess = np.linalg.lstsq(columns / scale, tau, rcond=None)[0] / scale
+        guess = np.linalg.lstsq(whole / scale, tau, rcond=None)[0] / scale
         extra = -(guess[0] + 3.0 * guess[1] * columns[:, :1] ** 2)
     values, inverse = _solve(data, zero, extra)
-    residual = tau - np.column_stack([columns, extra]) @ values
-    law, inverse = values[:3], inverse[:3]
-    covariance = _covariance(data, law, inverse, zero, residual)
+    residual = tau - np.column_stack([whole, extra]) @ values
+    full = _covariance(data, values[:count], inverse[:count], zero, residual)
+    law, covariance = values[:3], full[:3, :3]
     freedom = data.uncertainty.degrees_of_freedom
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    linear = np.linalg.lstsq(columns[:, [0, 2]] / scale[[0, 2]], tau, rcond=None)[0] / scale[[0, 2]]
-    held_out = _held_out(columns, motion, joint, zero, tau)
+    std = np.sqrt(np.maximum(np.diag(full), 0.0))
+    own = [k for k in range(count) if k != 1]
+    linear = np.linalg.lstsq(whole[:, own] / scale[own], tau, rcond=None)[0] / scale[own]
+    held_out = _held_out(whole, motion, joint, zero, tau)
     verdict, note = _verdict(law, std, freedom, held_out, float(np.std(columns[:, 0])), float(np.std(tau)))
     return SpringResult(
         joint=name,
@@ -289,7 +357,19 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         largest_deflection=float(np.abs(columns[:, 0]).max()),
         held_out=held_out,
         note=note,
+        terms=_terms(data, values, std),
+        full_covariance=tuple(tuple(float(v) for v in row) for row in full) if data.effects else (),
     )
+
+
+def _terms(data: _SpringData, values: FloatArray, std: FloatArray) -> tuple[SpringTerm, ...]:
+    """The effects beyond the law with their values, from those of all columns."""
+    found, start = [], 3
+    for effect, width in zip(data.effects, data.widths, strict=True):
+        stop = start + width
+        found.append(SpringTerm(effect, tuple(map(float, values[start:stop])), tuple(map(float, std[start:stop]))))
+        start = stop
+    return tuple(found)
 
 
 def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -306,13 +386,13 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     Returns:
         (c,) values and (c, N) the matrix by which a change of the torque changes them.
     """
-    design = np.column_stack([_columns(data.motion, data.joint, zero), extra])
+    design = np.column_stack([data.columns(data.motion, zero), extra])
     norms = np.linalg.norm(design, axis=0)
     if data.per_period is None:
         inverse = np.linalg.pinv(design / norms) / norms[:, None]
         return inverse @ data.tau, inverse
     periods = len(data.per_period)
-    tables = [np.column_stack([_columns(motion, data.joint, zero), extra]) / norms for motion, _ in data.per_period]
+    tables = [np.column_stack([data.columns(motion, zero), extra]) / norms for motion, _ in data.per_period]
     torques = [tau for _, tau in data.per_period]
     table, torque = sum(tables) / periods, sum(torques) / periods
     own = sum(t.T @ t for t in tables) / periods
@@ -329,7 +409,7 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
 def _covariance(
     data: _SpringData, law: FloatArray, inverse: FloatArray, zero: float, residual: FloatArray
 ) -> FloatArray:
-    """(3, 3) covariance of K1, K3, D, with that of the dynamic model in it.
+    """(3 + k, 3 + k) covariance of K1, K3, D and the other effects, with that of the dynamic model in it.
 
     Every period moves the law in two ways that are not independent: by its own deflections, and by its share in the
     dynamic model. Both are added up before they are squared.
@@ -342,7 +422,7 @@ def _covariance(
         )
     periods = len(data.per_period)
     factor = periods / (periods - 1.0)
-    direct = np.array([inverse @ (tau - _columns(motion, data.joint, zero) @ law) for motion, tau in data.per_period])
+    direct = np.array([inverse @ (tau - data.columns(motion, zero) @ law) for motion, tau in data.per_period])
     direct = (direct - direct.mean(axis=0)) / periods
     if uncertainty.kind in (CovarianceKind.PERIODS, CovarianceKind.REMAINDER) and periods >= FEW_PERIODS:
         moves = direct + uncertainty.influences @ step.T
@@ -384,7 +464,7 @@ def _held_out(columns: FloatArray, motion: Motion, joint: int, zero: float, tau:
     """Rms [N m] on pieces of the period that were left out of the fit, by law."""
     deflection = motion.deflection[:, joint] - zero
     reach = 3.0 * float(np.std(deflection))
-    laws = {"linear": columns[:, [0, 2]], "cubic": columns}
+    laws = {"linear": np.delete(columns, 1, axis=1), "cubic": columns}
     for share in (0.05, 0.2):
         slip = hysteresis_column(deflection, max(share * reach, 1e-300))
         laws[f"hysteresis {share:g}"] = np.column_stack([columns, slip])

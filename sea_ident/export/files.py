@@ -62,7 +62,8 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
         joints.append(joint)
     notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
     warnings = [] if physical.consistent else [physical.summary().splitlines()[0]]
-    return replace(values, joints=tuple(joints)), notes, warnings
+    inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
+    return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside)), notes, warnings
 
 
 def export_urdf(model: Model, path: str | Path) -> Export:

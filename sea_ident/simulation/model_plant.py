@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, make_effect
+from sea_ident.estimation import Model, physical_parameters
 from sea_ident.exceptions import SimulationError
 from sea_ident.robot import Robot
 from sea_ident.simulation.friction import FrictionLaw, SmoothCoulomb
@@ -34,6 +35,34 @@ class ModelPlant:
     plant: Plant
     friction: tuple[FrictionLaw, ...]
     effects: tuple[PlantedEffect, ...]
+
+
+def plant_from_identified(model: Model) -> ModelPlant:
+    """The plant that behaves as an identified model says.
+
+    What the data leave free of the bodies has the physically consistent values nearest to those of the description.
+
+    Args:
+        model: the model.
+
+    Returns:
+        The plant, its friction laws and the effects that act beside it, those in the springs included.
+
+    Raises:
+        IdentificationError: no physically consistent parameters are found.
+        SimulationError: a spring was not excited, so that its stiffness is not positive.
+    """
+    physical = physical_parameters(model)
+    robot, values = model.robot, [physical.values]
+    effects: list[Effect] = [*model.effects]
+    for spring in model.springs:
+        names = ("spring_stiffness", "spring_stiffening", "spring_damping")
+        effects.extend(make_effect(name, spring.joint) for name in names)
+        values.append(np.array(spring.law))
+        for term in spring.terms:
+            effects.append(term.effect)
+            values.append(np.array(term.values))
+    return plant_from_model(robot, effects, np.concatenate(values))
 
 
 def plant_from_model(robot: Robot, effects: Sequence[Effect], parameters: FloatArray) -> ModelPlant:
