@@ -24,7 +24,7 @@ class InstrumentalVariables(Estimator):
 
     With a simulator, Z is the regressor of the simulated motion, with the parameters of the round before (IDIM-IV).
     Without one, the instruments of every period are the regressors of all the others: their noise is another one.
-    Samples near reversal where friction varies from pass to pass are left out, see `steady`.
+    Samples near reversal where friction varies from pass to pass count less or not at all, see `steady`.
 
     Attributes:
         simulator: gives the motion that the closed loop makes with given parameters.
@@ -70,7 +70,7 @@ class InstrumentalVariables(Estimator):
             if moved < 1e-4:
                 break
         inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
-        meat = np.einsum("knb,kn,knc->bc", instruments, 1.0 / np.where(weights > 0.0, weights, np.inf), instruments)
+        meat = np.einsum("knb,kn,knc->bc", instruments, first.variance, instruments)
         return Estimate(
             values=values,
             instruments=instruments,
@@ -104,7 +104,7 @@ class InstrumentalVariables(Estimator):
         values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
         inverse: FloatArray = np.asarray(np.linalg.inv(cross / periods), dtype=np.float64)
         instruments = whole / periods * weights[:, :, None]
-        meat = np.einsum("knb,kn,knc->bc", instruments, 1.0 / np.where(weights > 0.0, weights, np.inf), instruments)
+        meat = np.einsum("knb,kn,knc->bc", instruments, first.variance, instruments)
         return Estimate(
             values=values,
             instruments=instruments,

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
 from sea_ident._typing import FloatArray
@@ -24,8 +23,11 @@ FEWEST_PERIODS = 6
 SPEED_BINS = 40
 """Classes of speed in which the scatter is compared."""
 
-RISE = 1.1
-"""Variance over that at speed from which on friction varies from pass to pass."""
+RISE = 0.1
+"""Rise of the variance over that at speed at which friction is taken to vary from pass to pass."""
+
+LEAST_SHARE = 1e-3
+"""Samples that would count less than this do not count."""
 
 LEAST_REST = 0.2
 """A rest below this share of the noise variance is chance."""
@@ -36,21 +38,21 @@ class SampleWeights:
     """Weights, and the weighted least-squares solution that they give.
 
     Attributes:
-        weights: (N, n) inverse variances of the mean torque, 0 where the model claims nothing.
+        weights: (N, n) inverse variances of the mean torque, less where the model claims less, 0 where nothing.
+        variance: (N, n) variance of the mean torque and what the model lacks [(N m)^2].
         solution: weighted least squares with them.
         notes: what adds to the scatter.
         warnings: what a user should know.
     """
 
     weights: FloatArray
+    variance: FloatArray
     solution: Solution
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
 
-def sample_weights(
-    observations: Observations, smoothing: float, keep: NDArray[np.bool_] | None = None
-) -> SampleWeights:
+def sample_weights(observations: Observations, smoothing: float, share: FloatArray | None = None) -> SampleWeights:
     """Weights from the variance of every sample (paper, eq. 20), smoothed over phase.
 
     The scatter says nothing of what the model lacks. Where the residual is larger than the scatter of the mean, the
@@ -59,7 +61,8 @@ def sample_weights(
     Args:
         observations: the data.
         smoothing: width of the window [s].
-        keep: (N, n) samples that count; all where the friction model claims to hold, where None.
+        share: (N, n) how much of a sample counts, from 0 to 1; all of it where None. Samples at which the friction
+            model does not claim to hold count nothing in any case.
 
     Returns:
         The weights.
@@ -72,11 +75,10 @@ def sample_weights(
     if processed.periods > 1:
         variance = smooth_over_phase(variance, processed.interval, smoothing)
     variance, warnings = floored(variance / processed.periods)
-    rows, torque, valid = observations.rows, observations.torque, observations.valid
-    if keep is not None:
-        valid = valid & keep
+    rows, torque = observations.rows, observations.torque
+    valid = observations.valid * (1.0 if share is None else share)
     count = np.maximum(valid.sum(axis=0) - rows.shape[-1] / rows.shape[1], 1.0)
-    noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1)
+    noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1.0)
     rest = np.zeros(rows.shape[1])
     for _ in range(ROUNDS):
         weights = valid / (variance + rest)
@@ -91,28 +93,29 @@ def sample_weights(
         for name, r in zip(observations.robot.joint_names, rest, strict=True)
         if r > 0.0 and processed.periods > 1
     )
-    return SampleWeights(weights, solution, notes, warnings)
+    return SampleWeights(weights, variance + rest, solution, notes, warnings)
 
 
-def steady(observations: Observations) -> NDArray[np.bool_]:
-    """(N, n) False at speeds so low that friction varies from pass to pass.
+def steady(observations: Observations) -> FloatArray:
+    """(N, n) how much a sample counts: little at speeds so low that friction varies from pass to pass.
 
     Where the torque scatters more near reversal than at speed, friction there is not the same at every pass. Its mean
     is then not that of the model either: at a pass with more friction the joint is slower at the same instant, so the
-    scatter is not averaged out. Weights of such samples are small but not zero; leaving them out costs little and
-    removes that bias. With few periods, or where no scatter rises, nothing is left out.
+    scatter is not averaged out. Weights by the variance alone are small but not small enough for that bias. A limit in
+    speed, found from the same scatter, would fall elsewhere in the next recording and move the friction with it, which
+    no spread between periods shows; so the share falls smoothly as the scatter rises. With few periods, or where no
+    scatter rises, all of every sample counts.
 
     Args:
         observations: the data.
 
     Returns:
-        Which samples are steady.
+        Share of every sample, from 0 to 1.
     """
     processed = observations.processed
-    speed, keep = np.abs(processed.motion.dtheta), np.ones(processed.tau_motor.shape, dtype=bool)
+    speed, share = np.abs(processed.motion.dtheta), np.ones(processed.tau_motor.shape)
     if processed.periods < FEWEST_PERIODS:
-        return keep
-    freedom = processed.periods - 1.0
+        return share
     for effect in observations.effects:
         if not isinstance(effect, CoulombFriction):
             continue
@@ -121,13 +124,16 @@ def steady(observations: Observations) -> NDArray[np.bool_]:
         bins = np.array_split(order, SPEED_BINS)
         level = np.array([processed.raw_tau_variance[part, j].mean() for part in bins])
         usual = float(np.median(level[SPEED_BINS // 2 :]))
-        error = np.sqrt(2.0 / (freedom * max(len(bins[0]), 1)))
+        if usual <= 0.0:
+            continue
         # scatter that falls with speed: the best fit of that kind, so that chance in one class does not decide
         falling = isotonic_regression(level, increasing=False).x
-        low = int(np.count_nonzero(falling > usual * (RISE + error)))
-        if 0 < low <= SPEED_BINS // 2:
-            keep[np.concatenate(bins[:low]), j] = False
-    return keep
+        rise = np.maximum(falling / usual - 1.0, 0.0)
+        counts = np.exp(-0.5 * (rise / RISE) ** 2)
+        counts[SPEED_BINS // 2 :] = 1.0
+        for part, count in zip(bins, np.where(counts > LEAST_SHARE, counts, 0.0), strict=True):
+            share[part, j] = count
+    return share
 
 
 def floored(variance: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
