@@ -138,7 +138,7 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
                 f"{data.source}: spikes in period(s) {where} of {data.periods}, far outside what the other periods "
                 "show; these periods were left out. Check the wiring of the sensor"
             )
-            data = _subset(data, keep)
+            data = subset(data, keep)
         else:
             warnings.append(
                 f"{data.source}: spikes in {len(spiked)} of {data.periods} periods ({where}): too many to leave out. "
@@ -193,7 +193,8 @@ def _spiked_periods(data: PeriodData) -> set[int]:
     return out
 
 
-def _subset(data: PeriodData, keep: list[int]) -> PeriodData:
+def subset(data: PeriodData, keep: list[int]) -> PeriodData:
+    """The data with some of the periods only."""
     motions = tuple(data.period_motions[p] for p in keep)
     tau = data.period_tau_motor[keep]
     names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")

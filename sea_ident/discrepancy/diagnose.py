@@ -19,13 +19,15 @@ from sea_ident.discrepancy.diagnosis import (
     Verdict,
     Waveforms,
 )
+from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, needed_share, own_torque, search, settle_again
+from sea_ident.discrepancy.search import Selection, needed_share, own_torque, search
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.signal import SignalEffect
@@ -33,6 +35,7 @@ from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
+from sea_ident.simulation import Controller
 
 FEWEST_PERIODS = 10
 """Periods from which on an effect is named without reservation."""
@@ -56,6 +59,7 @@ def diagnose(
     holdout: Recording | ProcessedRecording | None = None,
     reference: Model | None = None,
     period: float | None = None,
+    controller: Controller | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Find where a model and a recording disagree beyond noise, name the missing effect, and test the name.
@@ -66,6 +70,8 @@ def diagnose(
         holdout: another motion of the same robot, on which what is found must hold.
         reference: an earlier model of the same robot; shows what a refit absorbs (a payload, a changed inertia).
         period: [s]; found from the data by default.
+        controller: what drove the motors, for the gap in forward simulation; where None, the velocity controller of
+            `simulate` if it gives the measured torque, else the measured motion and torque stand in.
         progress: called with what is being done and the share that is done.
 
     Returns:
@@ -103,14 +109,39 @@ def diagnose(
     tell("looking for alternatives", 0.6)
     alternatives = assess.rivals(bench, selection)
     tell("testing on held-out data", 0.75)
-    held = _held_out(bench, selection, holdout, model)
+    held, held_notes = held_out(bench, selection, holdout)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
-    tell("writing it down", 0.9)
-    diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes, processed)
+    tell("simulating", 0.85)
+    repaired = repaired_model(model, processed, selection.final.fit)
+    forward = _forward(model, repaired, selection, held, recording, processed, controller)
+    notes = replace(notes, warnings=(*notes.warnings, *held_notes, *forward.notes))
+    tell("writing it down", 0.95)
+    diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes)
+    diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
     tell("done", 1.0)
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return diagnosis
+
+
+def _forward(
+    model: Model,
+    repaired: Model | None,
+    selection: Selection,
+    held: HeldOut | None,
+    recording: Recording | ProcessedRecording,
+    processed: ProcessedRecording,
+    controller: Controller | None,
+) -> SimulationGap:
+    """Forward simulation before and after, on another motion where there is one; nothing where nothing was added."""
+    before = repaired_model(model, processed, selection.start.fit) if selection.added else None
+    if before is None or repaired is None:
+        return SimulationGap({}, ())
+    if held is not None and held.processed is not None and held.recording is not None:
+        return simulation_gap(before, repaired, held.recording, held.processed, controller)
+    found = simulation_gap(before, repaired, recording, processed, controller)
+    same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
+    return replace(found, notes=(*same, *found.notes))
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:
@@ -125,47 +156,6 @@ def _period_of(model: Model, recording: Recording | ProcessedRecording) -> float
     return None
 
 
-class HeldOut:
-    """Data that were not used, and what the found effects are worth there.
-
-    Attributes:
-        bench: the data.
-        before: the model without the effects on them.
-        after: the model with the effects on them.
-        noise: noise floor there.
-        transfers: one per effect that was added.
-        source: what the data are.
-        other_motion: whether it is another motion, not only other periods.
-    """
-
-    def __init__(
-        self, bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, transfers: list[assess.Transfer],
-        source: str, other_motion: bool,
-    ) -> None:  # fmt: skip
-        self.bench, self.before, self.after, self.noise = bench, before, after, noise
-        self.transfers, self.source, self.other_motion = transfers, source, other_motion
-
-
-def _held_out(
-    bench: Bench, selection: Selection, holdout: Recording | ProcessedRecording | None, model: Model
-) -> HeldOut | None:
-    if holdout is None:
-        return None
-    robot = bench.robot
-    with python_warnings.catch_warnings():
-        python_warnings.simplefilter("ignore", SeaIdentWarning)
-        processed = wide_processing(holdout, robot, None)
-    if processed.period is None or processed.periods < 2:
-        return None
-    other = Bench(period_data(processed, robot), bench.effects)
-    start, final = selection.start.fit, selection.final.fit
-    before = other.predicted(start.effects, start.parameters)
-    after = other.predicted(final.effects, final.parameters)
-    now = settle_again(other, after)
-    transfers = assess.transfer(other, selection, now) if selection.added else []
-    return HeldOut(other, before, after, other.noise(after), transfers, processed.source, True)
-
-
 def _conclude(
     model: Model,
     bench: Bench,
@@ -175,7 +165,6 @@ def _conclude(
     held: HeldOut | None,
     change: ParameterChange | None,
     notes: check.Findings,
-    processed: ProcessedRecording,
 ) -> Diagnosis:
     start, final = selection.start, selection.final
     statistic, dof, p_value = lack_of_fit(bench, start)
@@ -206,7 +195,6 @@ def _conclude(
         holdout=held_gap,
         detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates),
         warnings=tuple(dict.fromkeys((*notes.warnings, *words.reservations(facts, held is not None)))),
-        model=repaired_model(model, processed, final.fit),
         waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
         recording=bench.data.source,
         holdout_source=None if held is None else held.source,

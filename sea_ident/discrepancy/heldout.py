@@ -1,0 +1,110 @@
+"""Data that were not used in the fit: another motion, or where none was given, every other period."""
+
+import warnings as python_warnings
+from dataclasses import dataclass, replace
+
+from sea_ident.discrepancy import assess, check
+from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.data import PeriodData, period_data, wide_processing
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.search import Selection, Settled, settle_again
+from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.processing import ProcessedRecording
+from sea_ident.recordings import Recording
+
+FEWEST_TO_SPLIT = 6
+"""Periods from which on half of them are held out where no other motion is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Data that were not used, and what the found effects are worth there.
+
+    Attributes:
+        bench: the data.
+        before: the model without the effects on them.
+        after: the model with the effects on them.
+        noise: noise floor there.
+        transfers: one per effect that was added.
+        source: what the data are.
+        processed: the other motion; None where other periods of the same motion were held out.
+        recording: as it was given; None where other periods of the same motion were held out.
+        warnings: what a user should know of these data.
+    """
+
+    bench: Bench
+    before: Fit
+    after: Fit
+    noise: NoiseFloor
+    transfers: tuple[assess.Transfer, ...]
+    source: str
+    processed: ProcessedRecording | None = None
+    recording: Recording | ProcessedRecording | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def other_motion(self) -> bool:
+        """Whether it is another motion, not only other periods."""
+        return self.processed is not None
+
+
+def held_out(
+    bench: Bench, selection: Selection, holdout: Recording | ProcessedRecording | None
+) -> tuple[HeldOut | None, tuple[str, ...]]:
+    """Try what was found on data that were not used.
+
+    Args:
+        bench: the recording that was used.
+        selection: what was found on it.
+        holdout: another motion; every other period of the same one where None.
+
+    Returns:
+        The outcome, None where there is nothing to try it on, and warnings.
+    """
+    if holdout is None:
+        return other_periods(bench, selection), ()
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        processed = wide_processing(holdout, bench.robot, None)
+    if processed.period is None or processed.periods < 2:
+        return other_periods(bench, selection), (
+            f"the held-out recording {processed.source} holds less than two periods of a motion: nothing can be tested "
+            "on it. Record it periodically, several periods",
+        )
+    data, findings = check.cleaned(period_data(processed, bench.robot), holdout)
+    warnings = [f"held-out data: {text}" for text in findings.warnings]
+    if findings.fatal or data.periods < 2:
+        warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")
+        return other_periods(bench, selection), tuple(warnings)
+    found = tried(Bench(data, bench.effects), selection, processed.source)
+    return replace(found, processed=processed, recording=holdout), tuple(warnings)
+
+
+def other_periods(bench: Bench, selection: Selection) -> HeldOut | None:
+    """Fit what was found to every other period, and try it on those between.
+
+    That is weaker than another motion: all that repeats from period to period transfers, rightly named or not.
+    """
+    data = bench.data
+    if data.periods < FEWEST_TO_SPLIT or not selection.added:
+        return None
+    used, left = (_every_other(data, first) for first in (0, 1))
+    part = Bench(used, bench.effects)
+    start, final = (settle_again(part, settled.fit) for settled in (selection.start, selection.final))
+    numbers = ", ".join(str(p + 1) for p in range(1, data.periods, 2)[:3])
+    source = f"periods {numbers}, ... of {data.source}"
+    return tried(Bench(left, bench.effects), replace(selection, start=start, final=final), source)
+
+
+def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
+    """A selection on data that it was not fitted to."""
+    start, final = selection.start.fit, selection.final.fit
+    before = other.predicted(start.effects, start.parameters)
+    after = other.predicted(final.effects, final.parameters)
+    now: Settled = settle_again(other, after)
+    transfers = tuple(assess.transfer(other, selection, now)) if selection.added else ()
+    return HeldOut(other, before, after, other.noise(after), transfers, source)
+
+
+def _every_other(data: PeriodData, first: int) -> PeriodData:
+    return check.subset(data, list(range(first, data.periods, 2)))
