@@ -6,7 +6,7 @@ import json
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ import sea_ident
 from sea_ident.atomic import atomic_file
 from sea_ident.estimation import identify
 from sea_ident.exceptions import RecordingError, SeaIdentError, SeaIdentWarning
-from sea_ident.recordings import read_recording
+from sea_ident.recordings import ColumnSource, read_recording
+from sea_ident.recordings.columns import as_source
 from sea_ident.recordings.files import SUFFIXES
 from sea_ident.robot import Robot, robot_from_text
 
@@ -99,6 +100,7 @@ class _Task:
     annotation: str | None
     joints: tuple[str, ...]
     period: float | None
+    columns: Mapping[str, str | ColumnSource] | None
     parent: int
 
     def fingerprint(self) -> str:
@@ -107,7 +109,8 @@ class _Task:
         with open(self.path, "rb") as file:
             while block := file.read(1 << 20):
                 digest.update(block)
-        settings = [self.urdf, self.annotation, self.joints, self.period, sea_ident.__version__]
+        columns = {name: asdict(as_source(how)) for name, how in sorted((self.columns or {}).items())}
+        settings = [self.urdf, self.annotation, self.joints, self.period, columns, sea_ident.__version__]
         digest.update(json.dumps(settings).encode())
         return digest.hexdigest()
 
@@ -126,6 +129,7 @@ def identify_batch(
     out: str | Path | None = None,
     *,
     period: float | None = None,
+    columns: Mapping[str, str | ColumnSource] | None = None,
     jobs: int = -1,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Batch:
@@ -140,6 +144,7 @@ def identify_batch(
         folder: where the recordings are.
         out: where models and table go; `identified` inside `folder` where None.
         period: [s]; found from the data where None.
+        columns: how foreign columns are called, in every recording; as in `read_recording`.
         jobs: recordings at a time; -1 is one per core.
         progress: called with the number done, the number of all, and the name of the recording.
 
@@ -148,7 +153,10 @@ def identify_batch(
 
     Raises:
         RecordingError: there is no such folder, or no recording in it.
+        SeaIdentError: `jobs` is 0.
     """
+    if jobs == 0:
+        raise SeaIdentError("jobs is 0; give at least 1, or -1 for one per core")
     paths = _recordings(Path(folder))
     target = Path(folder) / "identified" if out is None else Path(out)
     try:
@@ -157,9 +165,9 @@ def identify_batch(
     except OSError as error:
         raise RecordingError(f"{target}: cannot be made: {error.strerror or error}") from None
     tasks = [
-        _Task(str(path), robot.urdf, robot.source, robot.annotation, robot.joint_names, period, os.getpid())
+        _Task(str(path), robot.urdf, robot.source, robot.annotation, robot.joint_names, period, columns, os.getpid())
         for path in paths
-    ]  # fmt: skip
+    ]
     tell = progress or (lambda done, count, name: None)
     rows: dict[str, BatchRow] = {}
     prints: dict[str, str] = {}
@@ -215,7 +223,7 @@ def _one(task: _Task) -> _Outcome:
         warnings.simplefilter("ignore", SeaIdentWarning)
     try:
         robot = robot_from_text(task.urdf, task.source, task.annotation, task.joints)
-        recording = read_recording(task.path)
+        recording = read_recording(task.path, columns=task.columns)
         model = identify(robot, recording, period=task.period)
         found = tuple(dict.fromkeys((*recording.warnings, *model.warnings)))
         return _Outcome(task.path, model.to_dict(), "", found)

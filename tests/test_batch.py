@@ -15,9 +15,9 @@ import pytest
 
 from sea_ident import load_robot
 from sea_ident.batch import _one, identify_batch
-from sea_ident.exceptions import RecordingError
+from sea_ident.exceptions import RecordingError, SeaIdentError
 from sea_ident.motion import FourierSeries
-from sea_ident.recordings import Recording, write_recording
+from sea_ident.recordings import ColumnSource, Recording, write_recording
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*no transmission:sea_ident.exceptions.SeaIdentWarning")
 PERIOD = 2.0
@@ -136,6 +136,39 @@ def test_another_backend_of_joblib_takes_the_work_over(robot, fleet):
     with joblib.parallel_config(backend="threading"):
         result = identify_batch(robot, fleet, period=PERIOD, jobs=2)
     assert len(result.failed) == 1
+
+
+def test_foreign_columns_of_a_whole_fleet_are_named_once(robot, fleet):
+    header = "time,q_slider,tau_motor_slider"
+    for path in fleet.glob("robot*.csv"):
+        text = path.read_text()
+        assert text.startswith(header)
+        rows = np.loadtxt(path, delimiter=",", skiprows=1)
+        (fleet / "foreign").mkdir(exist_ok=True)
+        np.savetxt(
+            fleet / "foreign" / path.name,
+            rows * [1.0, 1000.0, 1.0],
+            fmt="%.17g",
+            delimiter=",",
+            header="time,carriage_mm,force",
+            comments="",
+        )
+    columns = {"q_slider": ColumnSource("carriage_mm", unit="mm"), "tau_motor_slider": "force"}
+    plain = identify_batch(robot, fleet, period=PERIOD, jobs=1)
+    foreign = identify_batch(robot, fleet / "foreign", period=PERIOD, columns=columns, jobs=1)
+    assert len(foreign.rows) == len(MASSES)
+    for row, other in zip(foreign.rows, plain.rows[1:], strict=True):
+        assert row.values == pytest.approx(other.values, rel=1e-6)
+    again = identify_batch(robot, fleet / "foreign", period=PERIOD, columns=columns, jobs=1)
+    assert all(row.resumed for row in again.rows)
+    columns["q_slider"] = ColumnSource("carriage_mm", unit="mm", sign=-1)
+    turned = identify_batch(robot, fleet / "foreign", period=PERIOD, columns=columns, jobs=1)
+    assert not any(row.resumed for row in turned.rows)
+
+
+def test_no_jobs_is_an_error(robot, fleet):
+    with pytest.raises(SeaIdentError, match="jobs is 0"):
+        identify_batch(robot, fleet, jobs=0)
 
 
 def test_a_folder_without_recordings_is_an_error(robot, tmp_path):

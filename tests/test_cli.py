@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 DATA = Path(__file__).parents[1] / ".." / "shared" / "data"
@@ -174,6 +175,18 @@ def test_validate_answers_per_joint(chain):
     assert max(record["nrms"].values()) < 0.2
 
 
+def test_foreign_columns_are_named_on_the_command_line(chain, tmp_path):
+    folder, said = chain
+    table = np.genfromtxt(folder / "rec.csv", delimiter=",", names=True)
+    names = [f"{name}_foreign" if name.startswith(("q_", "theta_")) else name for name in table.dtype.names]
+    rows = np.array(table.tolist())
+    rows[:, [name.startswith("q_") for name in names]] *= 180.0 / np.pi
+    np.savetxt(tmp_path / "rec.csv", rows, fmt="%.17g", delimiter=",", header=",".join(names), comments="")
+    columns = ("--column", "q_*=q_*_foreign,unit=deg", "--column", "theta_*=theta_*_foreign")
+    record = call_json("validate", folder / "model.json", tmp_path / "rec.csv", *columns)
+    assert record["rms"] == pytest.approx(said["validate"]["rms"], rel=1e-6)
+
+
 def test_an_exported_robot_is_a_robot_again(chain):
     folder = chain[0]
     record = call_json("inspect", folder / "out.urdf")
@@ -205,18 +218,31 @@ def test_a_report_needs_the_model_file_only(chain):
         (("report", "rec.csv", "--out", "never.html"), "rec.csv"),
         (("export", "model.json"), "--urdf"),
         (("batch", "nowhere", "--robot", "exo_leg"), "no such folder"),
+        (("batch", ".", "--robot", "exo_leg", "--jobs", "0"), "--jobs"),
+        (("excite", "exo_leg", "--out", "never.json", "--jobs", "0"), "--jobs"),
+        (("excite", "exo_leg", "--out", "never.json", "--base-frequency", "1e-9"), "samples"),
+        (("identify", "exo_leg", "rec.csv", "--out", "rec.csv"), "would be lost"),
+        (("identify", "out.urdf", "rec.csv", "--out", "never.json", "--report", "out.urdf"), "would be lost"),
+        (("export", "model.json", "--urdf", "model.json"), "would be lost"),
+        (("report", "model.json", "--out", "model.json"), "would be lost"),
+        (("diagnose", "model.json", "rec.csv", "--out", "model.json"), "would be lost"),
+        (("validate", "model.json", "rec.csv", "--column", "q_hip"), "NAME=SOURCE"),
+        (("validate", "model.json", "rec.csv", "--column", "q_hip=q_hip,unit=furlong"), "furlong"),
+        (("validate", "model.json", "rec.csv", "--column", "q_hip=q_hip,gear=2"), "gear_ratio"),
+        (("validate", "model.json", "rec.csv", "--column", "q_hip=q_hip,zero=north"), "NUMBER"),
+        (("validate", "model.json", "rec.csv", "--column", "q_hip=a", "--column", "q_hip=b"), "twice"),
     ],
 )
 def test_bad_input_names_the_culprit_and_writes_nothing(chain, arguments, expected):
     folder = chain[0]
     (folder / "bad.csv").write_text("time,q_hip\n0,0\n1,nan\n")
-    before = sorted(folder.iterdir())
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
     done = call(*arguments, cwd=folder)
     assert done.returncode == 2, done.stderr
     assert expected in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
-    assert sorted(folder.iterdir()) == before
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_ctrl_c_while_a_file_is_written_leaves_none(chain, tmp_path):

@@ -4,12 +4,15 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from sea_ident.exceptions import RecordingError
 
 if TYPE_CHECKING:
     from sea_ident.discrepancy import Diagnosis
     from sea_ident.effects import Effect
     from sea_ident.estimation import Model
+    from sea_ident.recordings import ColumnSource
     from sea_ident.robot import Robot
 
 
@@ -68,6 +71,48 @@ def _effects_of(robot: "Robot", text: str) -> "list[Effect]":
     return [
         make_effect(name, effect.joint, **{**effect.shape_values, **shape}) if shape else effect for effect in found
     ]
+
+
+def read_columns(texts: Sequence[str] | None) -> "dict[str, ColumnSource] | None":
+    """Translation of foreign columns that --column options of the form `NAME=SOURCE[,KEY=VALUE...]` mean.
+
+    Raises:
+        RecordingError: one has another form, an unknown key, or a value that is no number.
+    """
+    if not texts:
+        return None
+    found: dict[str, ColumnSource] = {}
+    for text in texts:
+        name, source = _column_of(text)
+        if name in found:
+            raise RecordingError(f"--column {text}: column {name} is named twice")
+        found[name] = source
+    return found
+
+
+def _column_of(text: str) -> "tuple[str, ColumnSource]":
+    from sea_ident.recordings import ColumnSource
+
+    place, *settings = text.split(",")
+    name, equals, source = (part.strip() for part in place.partition("="))
+    if not (name and equals and source):
+        raise RecordingError(f"--column {text}: is not NAME=SOURCE, such as q_knee=pos_knee,unit=deg")
+    how: dict[str, Any] = {}
+    for setting in settings:
+        key, _, value = (part.strip() for part in setting.partition("="))
+        if key in ("unit", "time"):
+            how[key] = value
+        elif key in ("zero", "scale", "sign", "gear_ratio", "counts_per_rev", "wraps_at"):
+            try:
+                how[key] = float(value)
+            except ValueError:
+                raise RecordingError(f"--column {text}: {setting!r} is not {key}=NUMBER") from None
+        else:
+            raise RecordingError(
+                f"--column {text}: the key {key!r} is not known; there are unit, zero, scale, sign, gear_ratio, "
+                "counts_per_rev, wraps_at, time"
+            )
+    return name, ColumnSource(source, **how)
 
 
 def read_result(path: Path, model: Path | None) -> "Model | Diagnosis":

@@ -48,5 +48,31 @@ ModelFile: TypeAlias = Annotated[
     Path, typer.Argument(metavar="MODEL.json", help="A model that `identify` wrote.", show_default=False)
 ]
 RecordingFile: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="REC", help="A recording (.csv, .npz, ...).", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="REC",
+        help="A recording: .csv, .npz, .mat, .parquet, .h5, .bag, .mcap, .db3, or the folder of a ROS 2 bag.",
+        show_default=False,
+    ),
+]
+ForeignColumns: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="NAME=SOURCE[,KEY=VALUE]",
+        help="Read column NAME (q_knee, ...) from SOURCE in the file; keys: unit, zero, scale, sign, gear_ratio, "
+        "counts_per_rev, wraps_at, time. One * on both sides stands for the same text. May be repeated.",
+    ),
+]
+
+
+def _at_least_one_job(jobs: int) -> int:
+    if jobs == -1 or jobs >= 1:
+        return jobs
+    raise typer.BadParameter(f"{jobs} is neither -1 (one per core) nor at least 1")
+
+
+Jobs: TypeAlias = Annotated[
+    int,
+    typer.Option("--jobs", help="Pieces of work at a time; -1: one per core.", callback=_at_least_one_job),
 ]

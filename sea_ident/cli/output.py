@@ -5,7 +5,7 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -61,13 +61,18 @@ def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def check_targets(*targets: Path | None) -> None:
+def check_targets(*targets: Path | None, inputs: Iterable[Path | str | None] = ()) -> None:
     """Refuse before the work starts what could not be written after it.
 
+    Args:
+        targets: files to be written.
+        inputs: files to be read, which no output may replace.
+
     Raises:
-        SeaIdentError: a folder does not exist or cannot be written to, or two outputs are one file.
+        SeaIdentError: a folder does not exist or cannot be written to, or an output is another one or an input.
     """
     seen: set[Path] = set()
+    read = {Path(name).resolve() for name in inputs if name is not None}
     for target in targets:
         if target is None:
             continue
@@ -78,6 +83,8 @@ def check_targets(*targets: Path | None) -> None:
             raise SeaIdentError(f"{target}: the folder {folder} does not exist; make it first")
         if not os.access(folder, os.W_OK):
             raise SeaIdentError(f"{target}: the folder {folder} cannot be written to")
+        if target.resolve() in read:
+            raise SeaIdentError(f"{target}: is read by this command and would be lost; name another file to write")
         if target.resolve() in seen:
             raise SeaIdentError(f"{target}: is named for two outputs; give each a file of its own")
         seen.add(target.resolve())

@@ -20,6 +20,9 @@ from sea_ident.excitation.starts import Progress, climb_from_starts
 from sea_ident.excitation.states import Sampling
 from sea_ident.robot import Limits, Robot
 
+_MOST_SAMPLES = 1_000_000
+"""Of a period; the observation matrix has this many rows per joint."""
+
 
 def design_excitation(
     robot: Robot,
@@ -59,7 +62,7 @@ def design_excitation(
             be given: links first, then motors.
         start: (n, 2 L + 1) coefficients of a further start; it is moved inside the limits if it is outside.
         ramp: ask for ramps between rest and the periodic motion, inside the same limits; none by default.
-        jobs: starts that are climbed at the same time; the result does not depend on it.
+        jobs: starts that are climbed at the same time, -1 for one per core; the result does not depend on it.
         progress: called after every step.
 
     Returns:
@@ -71,6 +74,8 @@ def design_excitation(
     """
     begin = time.perf_counter()
     samples = _check_sampling(base_frequency, harmonics, starts, rate)
+    if jobs == 0:
+        raise ExcitationError("jobs is 0; give at least 1, or -1 for one per core")
     notes: list[str] = []
     model, bound = design_model(
         robot,
@@ -127,5 +132,10 @@ def _check_sampling(base_frequency: float, harmonics: int, starts: int, rate: fl
         raise ExcitationError(
             f"{harmonics} harmonics of {base_frequency:g} Hz reach {highest:g} Hz, which is not below half the "
             f"sampling rate ({rate / 2.0:g} Hz); take fewer harmonics or a higher rate"
+        )
+    if rate / base_frequency > _MOST_SAMPLES:
+        raise ExcitationError(
+            f"a period of {1.0 / base_frequency:g} s has {rate / base_frequency:.3g} samples at {rate:g} Hz, more than "
+            f"{_MOST_SAMPLES}; take a higher base frequency or a lower rate"
         )
     return round(rate / base_frequency)

@@ -188,7 +188,8 @@ class Recording:
         return (
             f"{self.source}: joint {joint!r} needs column {name}, which is absent.{hint} "
             f"There are: time, {', '.join(self.columns) or 'nothing else'}. "
-            f"A column with another name is translated by columns={{'{name}': <name in the file>}}."
+            f"A column with another name is translated by columns={{'{name}': <name in the file>}}, on the command "
+            f"line by --column {name}=<name in the file>."
         )
 
 

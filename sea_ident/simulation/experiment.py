@@ -1,6 +1,6 @@
 """`simulate`: closed-loop forward dynamics of the elastic robot."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,6 +53,7 @@ def simulate(
     step: float = 2.5e-3,
     settling: Settling | None = None,
     start: Motion | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Simulation:
     """Simulate an experiment: the motors follow a reference, the sensors are recorded.
 
@@ -80,6 +81,7 @@ def simulate(
         settling: when the motion counts as periodic.
         start: its first sample is the initial state, and nothing is settled; by default a Fourier series is settled,
             and a Motion starts with its own velocity and the links in static equilibrium.
+        progress: called with the number of periods recorded so far, from 0 when the recording begins.
 
     Returns:
         The recording and the exact signals behind it.
@@ -140,8 +142,11 @@ def simulate(
     seeds = streams[0].spawn(robot.n)
     system.replace_motor_friction([vary.on(f, child) for f, child in zip(motors, seeds, strict=True)])
     count = periods if follow.period is not None else 1
+    tell = progress or (lambda done: None)
+    tell(0)
     for number in range(count):
         state = passes.record(state, number)
+        tell(number + 1)
     if follow.period is None:
         passes.record_end(state)
 

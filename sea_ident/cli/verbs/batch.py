@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from sea_ident.cli.inputs import read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, Period
+from sea_ident.cli.inputs import read_columns, read_robot
+from sea_ident.cli.options import AnnotationFile, AsJson, ForeignColumns, Jobs, JointNames, Period
 from sea_ident.cli.output import emit, progress
 
 
@@ -17,7 +17,8 @@ def batch(
         Path | None, typer.Option("--out", metavar="OUT", help="Folder for models and table. Default: DIR/identified.")
     ] = None,
     period: Period = None,
-    jobs: Annotated[int, typer.Option("--jobs", help="Recordings at a time; -1: one per core.")] = -1,
+    column: ForeignColumns = None,
+    jobs: Jobs = -1,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
     as_json: AsJson = False,
@@ -31,5 +32,7 @@ def batch(
         def count(done: int, total: int, name: str) -> None:
             tell(done, f"{done} of {total} {name}", total)
 
-        result = identify_batch(loaded, folder, out, period=period, jobs=jobs, progress=count)
+        result = identify_batch(
+            loaded, folder, out, period=period, columns=read_columns(column), jobs=jobs, progress=count
+        )
     emit(result.to_dict(), result.summary(), as_json=as_json)

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from sea_ident.cli.options import AsJson, ModelFile, Period, RecordingFile, ReportFile
+from sea_ident.cli.inputs import read_columns
+from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, RecordingFile, ReportFile
 from sea_ident.cli.output import check_targets, emit, note, progress
 
 STEPS = 100
@@ -26,6 +27,7 @@ def diagnose(
         Path | None, typer.Option("--model-out", metavar="MODEL2.json", help="Write the repaired model.")
     ] = None,
     period: Period = None,
+    column: ForeignColumns = None,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
@@ -34,9 +36,11 @@ def diagnose(
     from sea_ident.estimation import read_model
     from sea_ident.recordings import read_recording
 
-    check_targets(out, model_out, report)
+    check_targets(out, model_out, report, inputs=(model, recording, holdout, reference))
     loaded, earlier = read_model(model), None if reference is None else read_model(reference)
-    measured, other = read_recording(recording), None if holdout is None else read_recording(holdout)
+    columns = read_columns(column)
+    measured = read_recording(recording, columns=columns)
+    other = None if holdout is None else read_recording(holdout, columns=columns)
     with progress("diagnosing", STEPS) as tell:
         found = run(
             loaded,

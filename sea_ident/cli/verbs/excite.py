@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sea_ident.cli.inputs import read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, RobotSource, Seed
+from sea_ident.cli.options import AnnotationFile, AsJson, Jobs, JointNames, RobotSource, Seed
 from sea_ident.cli.output import best_so_far, check_targets, emit, note, progress
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def excite(
     harmonics: Annotated[int, typer.Option("--harmonics", help="Harmonics per joint.")] = 10,
     starts: Annotated[int, typer.Option("--starts", help="Random starts; the best is kept.")] = 8,
     seed: Seed = 0,
-    jobs: Annotated[int, typer.Option("--jobs", help="Starts at a time; -1: one per core.")] = -1,
+    jobs: Jobs = -1,
     ramp: Annotated[
         float | None,
         typer.Option(
@@ -63,7 +63,7 @@ def excite(
     from sea_ident.excitation import Ramp, design_excitation
     from sea_ident.excitation.joint_trajectory import bag_types
 
-    _check_targets(out, csv, yaml, bag)
+    _check_targets(out, csv, yaml, bag, inputs=(robot, annotation))
     _check_samples(base_frequency, harmonics, rate, periods, csv is not None, yaml is not None or bag is not None)
     if bag is not None:
         bag_types()
@@ -92,13 +92,15 @@ def excite(
     emit({**designed.to_dict(), "files": files}, f"{designed.summary()}\nwritten: {', '.join(files)}", as_json=as_json)
 
 
-def _check_targets(out: Path, csv: Path | None, yaml: Path | None, bag: Path | None) -> None:
+def _check_targets(
+    out: Path, csv: Path | None, yaml: Path | None, bag: Path | None, inputs: tuple[str | None, ...]
+) -> None:
     """As `check_targets`; a bag is a folder that is not there yet."""
     from sea_ident.exceptions import SeaIdentError
 
     if bag is not None and bag.is_dir():
         raise SeaIdentError(f"{bag}: exists already; remove it or choose another name")
-    check_targets(out, csv, yaml, bag)
+    check_targets(out, csv, yaml, bag, inputs=inputs)
 
 
 def _check_samples(

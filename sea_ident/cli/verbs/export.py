@@ -22,7 +22,7 @@ def export(
 
     if urdf is None and mjcf is None:
         raise SeaIdentError("nothing to write: give --urdf OUT.urdf, --mjcf OUT.xml, or both")
-    check_targets(urdf, mjcf)
+    check_targets(urdf, mjcf, inputs=(model,))
     loaded = read_model(model)
     done = []
     with progress("exporting"):

@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
-from sea_ident.cli.inputs import read_effects, read_robot, split_names
+from sea_ident.cli.inputs import read_columns, read_effects, read_robot, split_names
 from sea_ident.cli.options import (
     AddedEffects,
     AnnotationFile,
     AsJson,
+    ForeignColumns,
     JointNames,
     Period,
     RecordingFile,
@@ -28,6 +29,7 @@ def identify(
     report: ReportFile = None,
     add: AddedEffects = None,
     unknown_zero: UnknownZeros = None,
+    column: ForeignColumns = None,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
     as_json: AsJson = False,
@@ -36,10 +38,10 @@ def identify(
     from sea_ident.estimation import identify as run
     from sea_ident.recordings import read_recording
 
-    check_targets(out, report)
+    check_targets(out, report, inputs=(robot, annotation, recording))
     loaded = read_robot(robot, annotation, joints)
     effects = read_effects(loaded, add)
-    measured = read_recording(recording)
+    measured = read_recording(recording, columns=read_columns(column))
     with progress("identifying"):
         model = run(
             loaded,

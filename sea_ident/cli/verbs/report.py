@@ -30,7 +30,7 @@ def report(
     from sea_ident.excitation import read_excitation
     from sea_ident.report import write_report
 
-    check_targets(out)
+    check_targets(out, inputs=(result, model, excitation))
     loaded = read_result(result, model)
     series = None if excitation is None else read_excitation(excitation)
     with progress("writing the report"):

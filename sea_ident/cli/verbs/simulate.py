@@ -27,11 +27,15 @@ def simulate(
     from sea_ident.recordings import write_recording
     from sea_ident.simulation import simulate as run
 
-    check_targets(out)
+    check_targets(out, inputs=(robot, annotation, excitation))
     loaded = read_robot(robot, annotation, joints)
     reference = read_excitation(excitation)
-    with progress(f"simulating {periods} periods"):
-        result = run(loaded, reference, periods=periods, seed=seed)
+    with progress("waiting for the motion to be periodic", periods) as tell:
+
+        def count(done: int) -> None:
+            tell(done, f"period {min(done + 1, periods)} of {periods}")
+
+        result = run(loaded, reference, periods=periods, seed=seed, progress=count)
     write_recording(result.recording, out)
     record = {
         "robot": loaded.name,

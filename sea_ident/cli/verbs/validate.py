@@ -1,17 +1,24 @@
 """`sea-ident validate`: a model against a recording that was not used to find it."""
 
-from sea_ident.cli.options import AsJson, ModelFile, Period, RecordingFile
+from sea_ident.cli.inputs import read_columns
+from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, RecordingFile
 from sea_ident.cli.output import emit, progress
 
 
-def validate(model: ModelFile, recording: RecordingFile, period: Period = None, as_json: AsJson = False) -> None:
+def validate(
+    model: ModelFile,
+    recording: RecordingFile,
+    period: Period = None,
+    column: ForeignColumns = None,
+    as_json: AsJson = False,
+) -> None:
     """Compare the torque that a model predicts with a recording that was not used to find it."""
     from sea_ident.estimation import read_model
     from sea_ident.recordings import read_recording
     from sea_ident.validation import validate as run
 
     loaded = read_model(model)
-    measured = read_recording(recording)
+    measured = read_recording(recording, columns=read_columns(column))
     with progress("predicting"):
         result = run(loaded, measured, period=period)
     emit(result.to_dict(), result.summary(), as_json=as_json)
