@@ -51,7 +51,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
-                alike.append(Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0)))
+                alike.append(Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new))
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
         found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
     return found

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, effect_from_dict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import ModelFileError
+
+if TYPE_CHECKING:
+    from sea_ident.discrepancy.bench import Fit
 
 _LARGEST = 1e100  # magnitude beyond which a number was not written by a diagnosis
 
@@ -95,11 +98,13 @@ class Alternative:
         effect: name.
         joint: joint.
         cos2: share of the effect that it would explain as well [-].
+        fit: the whole model with it in the place of the effect, where that was fitted; not written to files.
     """
 
     effect: str
     joint: str | None
     cos2: float
+    fit: "Fit | None" = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
