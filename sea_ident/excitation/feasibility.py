@@ -4,7 +4,7 @@ A trajectory that keeps limits which are linear in the coefficients keeps them o
 constant: if any trajectory is inside, one at rest is. So their feasibility is a linear program in the n positions.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,7 +114,11 @@ def inner_position(limits: LinearLimits) -> FloatArray:
 
 
 def comfortable_position(
-    limits: LinearLimits, walls: Sequence[Wall], harmonics: int, names: Sequence[str], generator: np.random.Generator
+    limits: LinearLimits,
+    walls: Sequence[Wall],
+    harmonics: int,
+    describe: Callable[[int, float], str],
+    generator: np.random.Generator,
 ) -> FloatArray:
     """A position at rest inside the linear limits and inside walls that depend on it nonlinearly.
 
@@ -122,7 +126,7 @@ def comfortable_position(
         limits: linear limits.
         walls: torque and other limits.
         harmonics: L of the trajectories that the walls take.
-        names: of the walls' limits, in order; again from the first where there are more values.
+        describe: says how a limit stands: from its row in all walls and the part of its range that is left.
         generator: of random positions, tried if the middle of the limits is outside.
 
     Returns:
@@ -152,10 +156,10 @@ def comfortable_position(
             break
     if best_room <= 1e-3:
         tight = np.flatnonzero(best_values <= 1e-3)
-        described = ", ".join(dict.fromkeys(names[int(k) % len(names)] for k in tight))
+        described = "; ".join(dict.fromkeys(describe(int(k), float(best_values[k])) for k in tight))
         raise InfeasibleError(
-            f"no position was found at which the robot can stay inside {described}; the best of 400 lacks "
-            f"{max(-100.0 * best_room, 0.0):.3g} % of the range. Widen these limits"
+            f"no position was found at which the robot can stay inside all limits. At the best of 400: {described}. "
+            f"Widen these limits"
         )
     return best
 

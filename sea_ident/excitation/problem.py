@@ -1,5 +1,6 @@
 """An excitation problem: what is to be told, how well, and inside which limits."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,9 @@ from sea_ident.excitation.information import Information
 from sea_ident.excitation.linear_limits import LinearLimits, linear_limits
 from sea_ident.excitation.ramp import Ramp, RampMotion, design_ramp, design_ramp_out
 from sea_ident.excitation.result import Excitation
+from sea_ident.excitation.space_limits import SpaceLimits, space_limits
+from sea_ident.excitation.space_proof import TOLERANCE, proven_rooms
+from sea_ident.excitation.space_wall import SpaceWall
 from sea_ident.excitation.states import Sampling
 from sea_ident.excitation.walls import DynamicWall, LinearWall, Wall
 from sea_ident.motion import FourierSeries
@@ -41,7 +45,8 @@ class Problem:
         fine: information at the samples of the result.
         limits: limits that are linear in the coefficients.
         dynamic: limits on torque and deflection.
-        walls: both, on grids of times.
+        space: half-spaces and self-collision.
+        walls: all of them, on grids of times.
         centre: (n, 2 L + 1) a trajectory at rest, well inside.
     """
 
@@ -51,6 +56,7 @@ class Problem:
     fine: Information
     limits: LinearLimits
     dynamic: DynamicLimits
+    space: SpaceLimits
     walls: tuple[Wall, ...]
     centre: FloatArray
 
@@ -77,6 +83,7 @@ class Problem:
         prior = _collected(model, collected)
         fine = Information(model.columns, sampling, 1.0, weights, prior, model.springs)
         linear, dynamic = linear_limits(robot, limits), dynamic_limits(robot, limits, notes)
+        space = space_limits(robot, limits, notes)
         frequency, harmonics = sampling.base_frequency, sampling.harmonics
         nonlinear: list[Wall] = []
         if len(dynamic):
@@ -89,12 +96,14 @@ class Problem:
                     _turning(linear),
                 )
             )
+        if len(space):
+            nonlinear.append(SpaceWall.of(space, frequency, harmonics, _DYNAMIC_POINTS * harmonics))
         position = comfortable_position(
-            linear, nonlinear, harmonics, dynamic.names, np.random.default_rng([seed, 2**31])
+            linear, nonlinear, harmonics, _describer(dynamic, space), np.random.default_rng([seed, 2**31])
         )
         wall = LinearWall.of(linear, frequency, harmonics, _LINEAR_POINTS * harmonics)
         centre = at_rest(position, harmonics)
-        return Problem(robot, model, criterion, fine, linear, dynamic, (wall, *nonlinear), centre)
+        return Problem(robot, model, criterion, fine, linear, dynamic, space, (wall, *nonlinear), centre)
 
     @property
     def base_frequency(self) -> float:
@@ -135,11 +144,15 @@ class Problem:
         return self.criterion.value(information.matrix(coefficients))
 
     def margins(self, coefficients: FloatArray) -> FloatArray:
-        """(m,) smallest distance to each linear limit over all t, then what each dynamic limit is proven to keep."""
+        """(m,) smallest distance to each linear limit over all t, then what the others are proven to keep."""
         series = self.series(coefficients)
-        linear = self.limits.margins(series)
+        bounds = MotionBounds.of(series)
         return np.concatenate(
-            [linear, proven_margins(self.dynamic, series.motion, series.period, MotionBounds.of(series))]
+            [
+                self.limits.margins(series),
+                proven_margins(self.dynamic, series.motion, series.period, bounds),
+                proven_rooms(self.space, series.motion, series.period, bounds),
+            ]
         )
 
     def settle(self, coefficients: FloatArray) -> FloatArray:
@@ -179,8 +192,11 @@ class Problem:
 
     def _allows(self, ramp: RampMotion) -> bool:
         """Whether a ramp keeps the limits that are not linear."""
-        margins = proven_margins(self.dynamic, ramp.motion, ramp.duration, MotionBounds.of_ramp(ramp))
-        return float(margins.min(initial=0.0)) >= 0.0
+        bounds = MotionBounds.of_ramp(ramp)
+        margins = proven_margins(self.dynamic, ramp.motion, ramp.duration, bounds)
+        if float(margins.min(initial=0.0)) < 0.0:
+            return False
+        return float(proven_rooms(self.space, ramp.motion, ramp.duration, bounds).min(initial=0.0)) >= 0.0
 
     def result(
         self,
@@ -198,8 +214,9 @@ class Problem:
         scale = 1.0 / np.sqrt(np.diag(matrix))
         normalised = np.linalg.eigvalsh(matrix * np.outer(scale, scale))
         bound = self.dynamic.bound
-        names = (*self.limits.names, *self.dynamic.names)
-        lower, upper = np.concatenate([self.limits.lower, -bound]), np.concatenate([self.limits.upper, bound])
+        names = (*self.limits.names, *self.dynamic.names, *self.space.names)
+        lower = np.concatenate([self.limits.lower, -bound, self.space.lower])
+        upper = np.concatenate([self.limits.upper, bound, self.space.upper])
         margins = self.margins(coefficients)
         return Excitation(
             series=self.series(coefficients),
@@ -222,6 +239,22 @@ class Problem:
             ramp_out=ramps[1],
             warnings=notes,
         )
+
+
+def _describer(dynamic: DynamicLimits, space: SpaceLimits) -> Callable[[int, float], str]:
+    """How a nonlinear limit stands, from its row and the part of its range that is left (negative outside)."""
+    rows = len(dynamic) * (2 if dynamic.friction else 1)
+
+    def describe(row: int, part: float) -> str:
+        if row >= rows:
+            # `part` is what is left of the wall's upper bound
+            spent = TOLERANCE * space.size / space.reach
+            return space.describe(row - rows, space.reach * (part * (1.0 - spent) + spent))
+        k = row % len(dynamic)
+        bound, unit = dynamic.bound[k], dynamic.units[k]
+        return f"{dynamic.names[k]}: {(1.0 - part) * bound:.4g} {unit}, at most {bound:.4g} {unit}"
+
+    return describe
 
 
 def _turning(limits: LinearLimits) -> FloatArray:

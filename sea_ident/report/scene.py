@@ -14,8 +14,7 @@ import trimesh
 import yourdfpy
 
 from sea_ident._typing import FloatArray, IntArray
-from sea_ident.exceptions import RobotError
-from sea_ident.robot import Robot, find_urdf
+from sea_ident.robot import Robot, mesh_locator
 
 MOST_FACES = 9_000
 """Triangles of a whole robot: enough to recognise it, few enough to draw in a browser and to embed."""
@@ -150,7 +149,6 @@ def _parts(robot: Robot) -> list[Part]:
 
 def _shapes(robot: Robot) -> list[tuple[str, tuple[int, int, int] | None, FloatArray, IntArray]]:
     """Link, colour, vertices in the frame of the link, faces."""
-    folder = _folder(robot)
     urdf = yourdfpy.URDF.load(
         io.BytesIO(robot.urdf.encode()),
         build_scene_graph=False,
@@ -159,7 +157,7 @@ def _shapes(robot: Robot) -> list[tuple[str, tuple[int, int, int] | None, FloatA
         filename_handler=lambda name: name,
     )
     materials = {material.name: material for material in urdf.robot.materials if material is not None}
-    locate = _locator(folder)
+    locate = mesh_locator(robot.source)
     out = []
     for link in urdf.robot.links:
         for visual in link.visuals:
@@ -170,29 +168,6 @@ def _shapes(robot: Robot) -> list[tuple[str, tuple[int, int, int] | None, FloatA
             vertices = np.asarray(mesh.vertices) @ origin[:3, :3].T + origin[:3, 3]
             out.append((link.name, _color(visual.material, materials), vertices, np.asarray(mesh.faces, dtype=np.intp)))
     return out
-
-
-def _folder(robot: Robot) -> Path | None:
-    try:
-        return find_urdf(robot.source).resolve().parent
-    except RobotError:
-        return None
-
-
-def _locator(folder: Path | None) -> Callable[[str], Path | None]:
-    """How mesh names of a URDF become files: relative to it, or to a package among the folders above it."""
-
-    def locate(name: str) -> Path | None:
-        if folder is None:
-            return None
-        inner = name.removeprefix("package://").removeprefix("file://").removeprefix("model://")
-        for parent in (folder, *folder.parents):
-            for candidate in (parent / inner, parent / inner.partition("/")[2]):
-                if candidate.is_file():
-                    return candidate
-        return None
-
-    return locate
 
 
 def _mesh(geometry: Any, locate: Callable[[str], Path | None]) -> Any:

@@ -9,6 +9,14 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError
 from sea_ident.robot.actuator import Actuator, SeriesElasticActuator
 from sea_ident.robot.urdf import MOVING_TYPES, UrdfTree
+from sea_ident.robot.workspace import (
+    HALF_SPACE,
+    SELF_COLLISION,
+    HalfSpace,
+    SelfCollision,
+    parse_half_spaces,
+    parse_self_collision,
+)
 from sea_ident.robot.xml import LARGEST_NUMBER, number, vector
 
 SERIES_ELASTIC = "sea_ident/SeriesElastic"
@@ -43,12 +51,16 @@ class Annotation:
         limits: further limits of each joint: acceleration, jerk, deflection, torque.
         combinations: limits on linear combinations of joint positions.
         ignored: types of the transmissions that are not read.
+        half_spaces: limits on where points of links may be.
+        self_collision: the distance that links keep from each other.
     """
 
     actuators: dict[str, Actuator]
     limits: dict[str, dict[str, float]]
     combinations: tuple[LinearLimit, ...]
     ignored: tuple[str, ...]
+    half_spaces: tuple[HalfSpace, ...] = ()
+    self_collision: SelfCollision | None = None
 
 
 def _text_number(parent: etree._Element, tag: str, where: str, *, positive: bool = True) -> float | None:
@@ -210,6 +222,8 @@ def parse_annotation(root: etree._Element, file: str, tree: UrdfTree) -> Annotat
     limits: dict[str, dict[str, float]] = {}
     combinations: list[LinearLimit] = []
     ignored: list[str] = []
+    half_spaces: list[HalfSpace] = []
+    self_collision: SelfCollision | None = None
     for transmission in root.findall("transmission"):
         name = transmission.get("name", f"(line {transmission.sourceline})")
         where = f"{file}: transmission {name!r}"
@@ -217,9 +231,18 @@ def parse_annotation(root: etree._Element, file: str, tree: UrdfTree) -> Annotat
         if kind == LINEAR_LIMIT:
             combinations.append(_linear_limit(transmission, tree, where))
             continue
+        if kind == HALF_SPACE:
+            half_spaces += parse_half_spaces(transmission, tree, where)
+            continue
+        if kind == SELF_COLLISION:
+            if self_collision is not None:
+                raise RobotError(f"{where}: is the second of type {SELF_COLLISION}; state one")
+            self_collision = parse_self_collision(transmission, tree, where)
+            continue
         if kind not in (SERIES_ELASTIC, RIGID):
             if kind.startswith("sea_ident/"):
-                raise RobotError(f"{where}: unknown type {kind!r}; use {SERIES_ELASTIC} or {LINEAR_LIMIT}")
+                known = ", ".join((SERIES_ELASTIC, LINEAR_LIMIT, HALF_SPACE, SELF_COLLISION))
+                raise RobotError(f"{where}: unknown type {kind!r}; use {known}")
             ignored.append(kind or "no type")
             continue
         if kind == RIGID and _says_nothing(transmission):
@@ -235,4 +258,6 @@ def parse_annotation(root: etree._Element, file: str, tree: UrdfTree) -> Annotat
             for key, value in limits[joint].items():
                 if value <= 0.0:
                     raise RobotError(f"{where}: the {key} limit is {value}; it must be positive")
-    return Annotation(actuators, limits, tuple(combinations), tuple(dict.fromkeys(ignored)))
+    return Annotation(
+        actuators, limits, tuple(combinations), tuple(dict.fromkeys(ignored)), tuple(half_spaces), self_collision
+    )

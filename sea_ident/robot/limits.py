@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.robot.workspace import HalfSpace, SelfCollision
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +24,8 @@ class Limits:
         combination_lower: (c,) lowest value of each combination.
         combination_upper: (c,) highest value of each combination.
         combination_names: (c,) names of the combinations.
+        half_spaces: limits on where points of links may be.
+        self_collision: the distance that links keep from each other; None where they may touch.
     """
 
     lower: FloatArray
@@ -36,6 +39,8 @@ class Limits:
     combination_lower: FloatArray
     combination_upper: FloatArray
     combination_names: tuple[str, ...]
+    half_spaces: tuple[HalfSpace, ...] = ()
+    self_collision: SelfCollision | None = None
 
     @staticmethod
     def unlimited(n: int) -> "Limits":
@@ -55,6 +60,8 @@ class Limits:
             combination_names=(),
         )
 
-    def replace(self, **changes: FloatArray | tuple[str, ...]) -> "Limits":
+    def replace(
+        self, **changes: FloatArray | tuple[str, ...] | tuple[HalfSpace, ...] | SelfCollision | None
+    ) -> "Limits":
         """A copy with some fields replaced, as `dataclasses.replace`."""
         return replace(self, **changes)  # type: ignore[arg-type]

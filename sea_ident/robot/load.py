@@ -183,5 +183,7 @@ def _limits(
         combination_lower=np.array(least),
         combination_upper=np.array(most),
         combination_names=tuple(labels),
+        half_spaces=parsed.half_spaces,
+        self_collision=parsed.self_collision,
     )
     return limits, notes
