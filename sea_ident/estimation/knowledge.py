@@ -10,10 +10,14 @@ from sea_ident._typing import FloatArray
 from sea_ident.base_parameters import find_base_parameters
 from sea_ident.effects import Effect
 from sea_ident.estimation.model import Model
+from sea_ident.estimation.uncertainty import FEWEST_BLOCKS
 from sea_ident.exceptions import IdentificationError
 
 CORRELATED = 0.95
 """Correlation from which on two parameters are hardly told apart."""
+
+ROUNDING = 1e-12
+"""Share of unity that keeps a covariance positive definite."""
 
 POOR = 30.0
 """Relative standard deviation [%] from which on a parameter is not told."""
@@ -22,24 +26,43 @@ POOR = 30.0
 def regular_covariance(model: Model) -> FloatArray:
     """A covariance of the base parameters that can be inverted.
 
-    The spread of P periods gives a matrix of rank P - 1 whose small eigenvalues are too small. Standard deviations are
-    kept; the correlations are pulled toward those of eq. 13, the more the fewer periods there are per parameter.
+    The spread of P periods gives a matrix of rank P - 1 with false sharp directions. In coordinates in which eq. 13 is
+    unity it is drawn toward a multiple of unity, the more the fewer periods there are and the less they contradict
+    eq. 13. Directions that the motion tells sharply stay sharp and no others become so, which keeping every standard
+    deviation as it was seen would not give.
 
     Args:
         model: an identified model.
 
     Returns:
         (b, b) positive definite covariance.
+
+    References:
+        Chen, Wiesel, Eldar, Hero, Shrinkage algorithms for MMSE covariance estimation, IEEE Transactions on Signal
+        Processing, 2010 (the factor of shrinkage).
     """
-    std = np.maximum(model.std, 1e-12 * np.maximum(np.abs(model.values), 1e-12))
-    assumed = np.sqrt(np.diag(model.model_covariance))
-    shape = model.model_covariance / np.outer(assumed, assumed)
+    least = 1e-12 * np.maximum(np.abs(model.values), 1e-12)
+    scale = np.maximum(np.sqrt(np.maximum(np.diag(model.model_covariance), 0.0)), least)
+    strength, directions = np.linalg.eigh(model.model_covariance / np.outer(scale, scale))
+    root = scale[:, None] * directions * np.sqrt(np.maximum(strength, ROUNDING * strength[-1]))
+    half = np.linalg.solve(root, model.covariance)
+    seen = np.linalg.solve(root, half.T)
     freedom = model.uncertainty.degrees_of_freedom
-    share = 1.0 if not np.isfinite(freedom) else min(1.0, len(std) / freedom)
-    if np.all(model.std > 0.0):
-        seen = model.covariance / np.outer(model.std, model.std)
-        shape = share * shape + (1.0 - share) * seen
-    return np.asarray(shape * np.outer(std, std), dtype=np.float64)
+    drawn = _shrunk(0.5 * (seen + seen.T), freedom if np.isfinite(freedom) else FEWEST_BLOCKS)
+    return np.asarray(root @ drawn @ root.T, dtype=np.float64)
+
+
+def _shrunk(covariance: FloatArray, freedom: float) -> FloatArray:
+    """A covariance (b, b) drawn toward a multiple of unity, as far as its degrees of freedom advise."""
+    size = len(covariance)
+    trace = float(np.trace(covariance))
+    if trace <= 0.0:
+        return ROUNDING * np.eye(size)
+    square = float(np.sum(covariance**2))
+    spread = (freedom + 1.0 - 2.0 / size) * (square - trace**2 / size)
+    share = 1.0 if spread <= 0.0 else min(1.0, ((1.0 - 2.0 / size) * square + trace**2) / spread)
+    share = max(share, ROUNDING)
+    return np.asarray((1.0 - share) * covariance + share * trace / size * np.eye(size), dtype=np.float64)
 
 
 def information_about(model: Model, effects: Sequence[Effect] | None = None) -> FloatArray:
@@ -155,12 +178,14 @@ def what_is_known(model: Model, *, level: float = 0.05) -> Knowledge:
         values[dropped] = 0.0
         current = covariance - gain @ covariance[dropped]
         current[dropped], current[:, dropped] = 0.0, 0.0
+    # what is left is known as well as was stated, or better where dropping others helps
+    stated = model.std / np.sqrt(np.diag(covariance))
     reduced = replace(
         model,
         values=values,
         uncertainty=replace(
             model.uncertainty,
-            covariance=current if dropped else model.covariance,
+            covariance=current * np.outer(stated, stated) if dropped else model.covariance,
             influences=np.zeros((0, count)) if dropped else model.uncertainty.influences,
         ),
     )
