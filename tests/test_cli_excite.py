@@ -77,6 +77,19 @@ def test_a_trajectory_that_ends_in_motion_is_told(tmp_path):
     assert len(yaml.safe_load((tmp_path / "t.yaml").read_text())["points"]) == 100
 
 
+def test_limits_in_space_are_kept_and_told(tmp_path):
+    done = call(
+        "excite", "exo_leg", "--out", "e.json", *QUICK, "--half-space", "foot@0,0,-0.05:1,0,0,0.5",
+        "--half-space", "shank:0,0,1,2", "--self-collision", 0.02, "--json", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)
+    assert record["limits"]["plane 1 (foot)"] == [None, 0.5]
+    assert record["limits"]["thigh - foot.distance"] == [0.02, None]
+    assert min(record["margins"].values()) >= 0.0
+    assert "not watched, because they are neighbours" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -89,6 +102,11 @@ def test_a_trajectory_that_ends_in_motion_is_told(tmp_path):
         (("--ramp", "nan"), "duration of the ramp is nan s"),
         (("--harmonics", "500"), "not below half the sampling rate"),
         (("--base-frequency", "nan"), "base_frequency is nan"),
+        (("--half-space", "foot:0,0,1"), "write LINK:NX,NY,NZ,D"),
+        (("--half-space", "foot@1,2:0,0,1,1"), "write LINK:NX,NY,NZ,D"),
+        (("--half-space", "heel:0,0,1,1"), "no link 'heel'; its links: hip_base, thigh, shank, foot"),
+        (("--half-space", "foot:0,0,1,-3"), "plane 1 (foot): n . p = "),
+        (("--self-collision", "-1"), "distance is -1.0 m"),
     ],
 )
 def test_bad_input_is_refused_and_nothing_is_written(tmp_path, arguments, expected):

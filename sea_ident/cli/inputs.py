@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sea_ident.effects import Effect
     from sea_ident.estimation import Model
     from sea_ident.recordings import ColumnSource
-    from sea_ident.robot import Robot
+    from sea_ident.robot import HalfSpace, Limits, Robot
 
 
 def read_robot(source: str, annotation: str | None, joints: str | None) -> "Robot":
@@ -21,6 +21,47 @@ def read_robot(source: str, annotation: str | None, joints: str | None) -> "Robo
     from sea_ident.robot import load_robot
 
     return load_robot(source, annotation, None if joints is None else split_names(joints))
+
+
+def read_limits(robot: "Robot", half_spaces: Sequence[str] | None, self_collision: float | None) -> "Limits":
+    """The limits of a robot with those that --half-space and --self-collision add.
+
+    Raises:
+        SeaIdentError: a half-space that is not written as it should be.
+    """
+    from sea_ident.robot import SelfCollision
+
+    limits = robot.limits
+    added = tuple(_half_space(text, f"plane {k}") for k, text in enumerate(half_spaces or (), 1))
+    limits = limits.replace(half_spaces=limits.half_spaces + added)
+    if self_collision is None:
+        return limits
+    ignored = () if limits.self_collision is None else limits.self_collision.ignored
+    return limits.replace(self_collision=SelfCollision(self_collision, ignored))
+
+
+def _half_space(text: str, name: str) -> "HalfSpace":
+    """What `LINK[@X,Y,Z]:NX,NY,NZ,D` means; names of links may hold colons and @."""
+    import numpy as np
+
+    from sea_ident.exceptions import SeaIdentError
+    from sea_ident.robot import HalfSpace
+
+    place, _, plane = text.rpartition(":")
+    link, point = place, [0.0, 0.0, 0.0]
+    try:
+        *normal, offset = (float(part) for part in plane.split(","))
+        if "@" in place:
+            link, _, where = place.rpartition("@")
+            point = [float(part) for part in where.split(",")]
+    except ValueError:
+        normal, offset = [], 0.0
+    if not link or len(normal) != 3 or len(point) != 3:
+        raise SeaIdentError(
+            f"--half-space {text}: write LINK:NX,NY,NZ,D or LINK@X,Y,Z:NX,NY,NZ,D, such as tool:0,0,-1,-0.1 for a tool "
+            f"that stays 0.1 m above the ground"
+        )
+    return HalfSpace(name, link, np.array(normal), offset, np.array(point))
 
 
 def split_names(text: str | None) -> list[str]:

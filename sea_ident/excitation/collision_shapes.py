@@ -138,7 +138,7 @@ def _outline(geometry: Any, locate: Callable[[str], Path | None], where: str) ->
         vertices = np.asarray(loaded.vertices, dtype=np.float64)
     except Exception as error:  # the readers of trimesh raise whatever they do
         raise ExcitationError(f"{where}: {path} cannot be read: {error}") from None
-    return _hull(_checked(vertices * (1.0 if scale is None else np.asarray(scale)), where)), 0.0
+    return _hull(_checked(vertices * (1.0 if scale is None else np.asarray(scale)), f"{where}: {path}")), 0.0
 
 
 def _checked(vertices: FloatArray, where: str) -> FloatArray:
@@ -177,7 +177,8 @@ def watched_pairs(
 
     Left out, as in an SRDF, are shapes on one body, those of neighbouring bodies, those that the user ignores, and
     links that are always in contact: at the neutral position and, of 200 random positions inside the limits, in at
-    least 95 %. Links that are always nearer than the distance, but not in contact, have to stay out of contact only.
+    least 95 %. Links with one body between them that are always nearer than the distance, but not in contact, have to
+    stay out of contact only.
 
     Args:
         robot: the robot.
@@ -215,6 +216,7 @@ def watched_pairs(
         {names for names, members in by_links.items() if _always(apart[:, members].min(axis=1) <= least)}
         for least in (0.0, distance)
     )
+    near &= {_links(shapes, pair) for pair in pairs if _one_between(chain, shapes, pair)}
     _say("self-collision: not watched, because they are neighbours", adjacent, notes)
     _say("self-collision: not watched, because they are in contact in nearly all positions", touching, notes)
     _say(
@@ -234,6 +236,12 @@ def watched_pairs(
 
 def _links(shapes: Sequence[Shape], pair: Pair) -> frozenset[str]:
     return frozenset((shapes[pair.first].link, shapes[pair.second].link))
+
+
+def _one_between(chain: Chain, shapes: Sequence[Shape], pair: Pair) -> bool:
+    """Whether one body, or the joint on which both hang, is between two bodies."""
+    a, b = shapes[pair.first].body, shapes[pair.second].body
+    return int(np.count_nonzero(chain.carries[:, a] != chain.carries[:, b])) == 2
 
 
 def _always(happens: NDArray[np.bool_]) -> bool:

@@ -112,8 +112,9 @@ def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> Float
             f"start is {coefficients.shape}; it must hold {problem.centre.shape} finite coefficients, as "
             f"FourierSeries.coefficients"
         )
-    if float(problem.margins(coefficients).min(initial=0.0)) < 0.0:
-        notes.append("the given start is outside the limits; it was moved inside")
+    outside = problem.outside(coefficients)
+    if outside:
+        notes.append(f"the given start is outside the limits; it was moved inside: {', '.join(outside)}")
     return coefficients
 
 

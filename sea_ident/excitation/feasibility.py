@@ -19,6 +19,7 @@ from sea_ident.excitation.walls import Wall
 from sea_ident.motion import FourierSeries
 
 _CUT_ROUNDS = 3
+_MOST_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +157,11 @@ def comfortable_position(
             break
     if best_room <= 1e-3:
         tight = np.flatnonzero(best_values <= 1e-3)
-        described = "; ".join(dict.fromkeys(describe(int(k), float(best_values[k])) for k in tight))
+        tight = tight[np.argsort(best_values[tight], kind="stable")]
+        found = list(dict.fromkeys(describe(int(k), float(best_values[k])) for k in tight))
+        if len(found) > _MOST_NAMED:
+            found[_MOST_NAMED:] = [f"{len(found) - _MOST_NAMED} more"]
+        described = "; ".join(found)
         raise InfeasibleError(
             f"no position was found at which the robot can stay inside all limits. At the best of 400: {described}. "
             f"Widen these limits"

@@ -143,6 +143,10 @@ class Problem:
         """The criterion."""
         return self.criterion.value(information.matrix(coefficients))
 
+    def reported(self, coefficients: FloatArray) -> float:
+        """The number by which designs are compared."""
+        return self.criterion.reported(self.fine.matrix(coefficients))
+
     def margins(self, coefficients: FloatArray) -> FloatArray:
         """(m,) smallest distance to each linear limit over all t, then what the others are proven to keep."""
         series = self.series(coefficients)
@@ -154,6 +158,18 @@ class Problem:
                 proven_rooms(self.space, series.motion, series.period, bounds),
             ]
         )
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """(m,) names in the order of `margins`."""
+        return (*self.limits.names, *self.dynamic.names, *self.space.names)
+
+    def outside(self, coefficients: FloatArray) -> list[str]:
+        """Which limits a trajectory violates, and by how much."""
+        units = (*self.limits.units, *self.dynamic.units, *(["m"] * len(self.space)))
+        margins = self.margins(coefficients)
+        order = [int(k) for k in np.argsort(margins, kind="stable") if margins[k] < 0.0]
+        return [f"{self.limit_names[k]} by {-margins[k]:.3g} {units[k]}" for k in order]
 
     def settle(self, coefficients: FloatArray) -> FloatArray:
         """Shrink a trajectory toward rest by the little that it takes to be inside for all t."""
@@ -214,7 +230,6 @@ class Problem:
         scale = 1.0 / np.sqrt(np.diag(matrix))
         normalised = np.linalg.eigvalsh(matrix * np.outer(scale, scale))
         bound = self.dynamic.bound
-        names = (*self.limits.names, *self.dynamic.names, *self.space.names)
         lower = np.concatenate([self.limits.lower, -bound, self.space.lower])
         upper = np.concatenate([self.limits.upper, bound, self.space.upper])
         margins = self.margins(coefficients)
@@ -229,8 +244,8 @@ class Problem:
             raw_condition_number=float(np.sqrt(eigenvalues[-1] / eigenvalues[0])),
             parameters=self.model.names,
             samples=self.fine.sampling.samples,
-            margins={name: float(value) for name, value in zip(names, margins, strict=True)},
-            limits={name: (float(lower[k]), float(upper[k])) for k, name in enumerate(names)},
+            margins={name: float(value) for name, value in zip(self.limit_names, margins, strict=True)},
+            limits={name: (float(lower[k]), float(upper[k])) for k, name in enumerate(self.limit_names)},
             starts=starts,
             start_values=values,
             seed=seed,

@@ -16,6 +16,8 @@ from sea_ident.motion import FourierSeries
 
 FORMAT = "sea_ident excitation"
 VERSION = 1
+_DISTANCES = 5
+"""Distances between links that a summary shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +85,28 @@ class Excitation:
             f"  log det {self.log_det:.4f}, condition number {self.condition_number:.4g} "
             f"({self.raw_condition_number:.4g} without normalisation), {self.samples} samples",
         ]
-        width = max((len(name) for name in self.margins), default=0)
-        for name, margin in self.margins.items():
-            lower, upper = self.limits[name]
-            lines.append(f"  {name:<{width}}  [{lower:.5g}, {upper:.5g}]  margin {margin:.3g}")
+        lines.extend(self._margin_lines())
         if self.ramp_in is not None and self.ramp_out is not None:
             lines.append(f"  ramps: {self.ramp_in.duration:g} s in, {self.ramp_out.duration:g} s out")
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
+
+    def _margin_lines(self) -> list[str]:
+        """One line for every limit; of the distances between links those with the least room."""
+        apart = sorted(
+            (name for name in self.margins if name.endswith(".distance")), key=lambda name: self.margins[name]
+        )
+        left_out = apart[_DISTANCES:]
+        shown = [name for name in self.margins if name not in left_out]
+        width = max((len(name) for name in shown), default=0)
+        lines = []
+        for name in shown:
+            lower, upper = self.limits[name]
+            lines.append(f"  {name:<{width}}  [{lower:.5g}, {upper:.5g}]  margin {self.margins[name]:.3g}")
+        if left_out:
+            least = self.margins[left_out[0]]
+            lines.append(f"  {len(left_out)} more pairs of links  margin {least:.3g} at least")
+        return lines
 
     def to_dict(self) -> dict[str, Any]:
         """A form that JSON can hold; `read_excitation` reads it."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sea_ident.cli.inputs import read_robot
+from sea_ident.cli.inputs import read_limits, read_robot
 from sea_ident.cli.options import AnnotationFile, AsJson, Jobs, JointNames, RobotSource, Seed
 from sea_ident.cli.output import best_so_far, check_targets, emit, note, progress
 
@@ -30,6 +30,19 @@ def excite(
     starts: Annotated[int, typer.Option("--starts", help="Random starts; the best is kept.")] = 8,
     seed: Seed = 0,
     jobs: Jobs = -1,
+    half_space: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--half-space",
+            metavar="LINK[@X,Y,Z]:NX,NY,NZ,D",
+            help="Keep a point of a link (its origin by default) at n . p <= D in the frame of the base [m]; may be "
+            "repeated.",
+        ),
+    ] = None,
+    self_collision: Annotated[
+        float | None,
+        typer.Option("--self-collision", metavar="M", help="Least distance between links that are not neighbours [m]."),
+    ] = None,
     ramp: Annotated[
         float | None,
         typer.Option(
@@ -68,6 +81,7 @@ def excite(
     if bag is not None:
         bag_types()
     loaded = read_robot(robot, annotation, joints)
+    limits = read_limits(loaded, half_space, self_collision)
     with progress("designing the excitation", starts) as tell, best_so_far():
         ended: set[int] = set()
 
@@ -82,6 +96,7 @@ def excite(
             harmonics=harmonics,
             starts=starts,
             seed=seed,
+            limits=limits,
             ramp=None if ramp is None else Ramp(ramp),
             jobs=jobs,
             progress=report,
