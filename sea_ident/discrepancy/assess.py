@@ -11,7 +11,16 @@ from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.diagnosis import Alternative, Detectability
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, Settled, penalty, physical, significance
+from sea_ident.discrepancy.search import (
+    FAMILY_LEVEL,
+    Selection,
+    Settled,
+    of_every_kind,
+    penalty,
+    physical,
+    refitted,
+    significance,
+)
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 
@@ -41,12 +50,11 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         gain = reduced.statistic - fit.statistic
         unit = max(fit.statistic / max(fit.dof, 1), 1.0)
         alike: list[Alternative] = []
-        tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)][:RIVALS]
-        for candidate in tried:
+        tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)]
+        for candidate in of_every_kind(tried, RIVALS):
             if candidate.gain < 0.3 * gain:
-                break
-            model = [*others[:position], candidate.effect, *others[position:]]
-            new = bench.refine(model, noise, start=fit.parameters, only=len(bench.effects))
+                continue
+            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened

@@ -10,7 +10,14 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
-from sea_ident.discrepancy.data import EquationKind, PeriodData, free_samples, spectrum, towards_mean
+from sea_ident.discrepancy.data import (
+    EquationKind,
+    PeriodData,
+    around_reversal,
+    free_samples,
+    spectrum,
+    towards_mean,
+)
 from sea_ident.discrepancy.noise import NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.effects import (
     Anchor,
@@ -33,11 +40,14 @@ ComplexArray = NDArray[np.complex128]
 PERIOD_SAMPLES = 2.5
 """Samples of a single period that its model torque is computed at, per harmonic compared."""
 
-MOST_FIT_STEPS = 6
+MOST_FIT_STEPS = 10
 """Largest number of steps of a fit; a model that is right needs two."""
 
 RANK_TOLERANCE = 1e-9
 """Singular directions of the normalised columns below this share of the largest are left out."""
+
+RIDGE = 1e-6
+"""Keeps steps of shapes finite that do the same, as a share of what each does."""
 
 VARIANTS_KEPT = 3e8
 """Bytes of columns of candidates that are kept for the next search."""
@@ -117,6 +127,7 @@ class Bench:
         self.effects = tuple(effects)
         self.robot = data.robot
         self._target = spectrum(data.target(data.tau_motor), data.harmonics)
+        self._left_out = data.left_out
         self._free = free_samples(data.left_out, data.harmonics)
         self._free_basis: tuple[NoiseFloor | None, FloatArray] | None = None
         self._states: dict[tuple[Effect, ...], State] = {}
@@ -126,6 +137,20 @@ class Bench:
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
         self.derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
+
+    def release(self, effects: Sequence[Effect]) -> None:
+        """Leave out further samples: where torques of a model jump at the reversal of a speed of their own."""
+        left_out = self._left_out.copy()
+        for effect in effects:
+            turning = effect.turning(self.data.motion, self.robot)
+            if turning is not None:
+                rows = around_reversal(turning[1])
+                for e, equation in enumerate(self.data.equations):
+                    if equation.index == turning[0] and equation.kind is not EquationKind.LINK:
+                        left_out[:, e] |= rows
+        if np.any(left_out != self._left_out):
+            self._left_out, self._free_basis = left_out, None
+            self._free = free_samples(left_out, self.data.harmonics)
 
     # -- columns of the mean ---------------------------------------------------------------------------------------
 
@@ -270,7 +295,8 @@ class Bench:
         directions = self._scaled_columns(columns, values, design, residual, scale, noise)
         shapes = free_shapes(effects) if tangents else ()
         if shapes:
-            bent = self.tangents(effects, columns, values, shapes) * scale[:, None]
+            stiffness = self.stiffness_slopes(columns, design) @ values
+            bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, stiffness)
             directions = np.concatenate([directions, bent], axis=2)
         _, basis, factor = solve(_off(free, whiten(whitener, directions)), whitened)
         basis = np.concatenate([free, basis], axis=1)
@@ -324,15 +350,47 @@ class Bench:
         noise: NoiseFloor | None,
     ) -> ComplexArray:
         """(H + 1, E, p) decrease of the scaled residual with every parameter."""
-        out = design * scale[:, None]
         if noise is None:
-            return out
+            return design * scale[:, None]
         slopes = self.stiffness_slopes(columns, design)
+        return self.scaled(design, slopes, residual, scale, slopes @ values)
+
+    def scaled(
+        self, change: ComplexArray, slopes: FloatArray, residual: ComplexArray, scale: FloatArray, stiffness: FloatArray
+    ) -> ComplexArray:
+        """Decrease of the scaled residual where the model torque changes, and the stiffness that scales it.
+
+        Args:
+            change: (H + 1, E, k) change of the model torque.
+            slopes: (E, k) change of the stiffness with it.
+            residual: (H + 1, E).
+            scale: (E,) factor of the residual.
+            stiffness: (E,) of the springs in the link equations.
+
+        Returns:
+            (H + 1, E, k).
+        """
+        out = change * scale[:, None]
         for e in self._deflections:
-            total = float(slopes[e] @ values)
-            if self.first_stiffness[e] > 0.0 and total > 0.02 * self.first_stiffness[e]:
-                out[:, e] += scale[e] * np.outer(residual[:, e], slopes[e] / total)
+            if self.first_stiffness[e] > 0.0 and stiffness[e] > 0.02 * self.first_stiffness[e]:
+                out[:, e] += scale[e] * np.outer(residual[:, e], slopes[e] / stiffness[e])
         return out
+
+    def slopes_of(self, change: ComplexArray, equations: Sequence[int]) -> FloatArray:
+        """(E, k) slope over the deflection of a torque (H + 1, E, k) of the springs of some link equations."""
+        out = np.zeros(change.shape[1:])
+        for e in equations:
+            if e in self._deflections:
+                deflection = self._deflections[e]
+                power = float(np.sum(np.abs(deflection) ** 2))
+                if power > 0.0:
+                    out[e] = -np.real(deflection.conj() @ change[1:, e]) / power
+        return out
+
+    def stiffness_of(self, fit: Fit) -> FloatArray:
+        """(E,) slope of the springs of a fit over their deflection."""
+        slopes: FloatArray = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
+        return slopes
 
     @cached_property
     def first_fit(self) -> Fit:
@@ -377,16 +435,23 @@ class Bench:
         columns: tuple[Column, ...],
         values: FloatArray,
         shapes: Sequence[tuple[int, Shape]],
-    ) -> ComplexArray:
-        """(H + 1, E, s) change of the model torque with each free shape, in the coordinates of `coordinate`."""
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Change with each free shape, in the coordinates of `moved`.
+
+        Returns:
+            (H + 1, E, s) of the model torque, and (E, s) of the stiffness of the springs.
+        """
         counts = self.counts(effects)
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
         out = np.zeros((self.data.harmonics + 1, len(self.data.equations), len(shapes)), dtype=np.complex128)
+        slopes = np.zeros(out.shape[1:])
         parameters = {column.name: float(value) for column, value in zip(columns, values, strict=True)}
         for k, (position, shape) in enumerate(shapes):
             effect = effects[position]
             if isinstance(effect, SignalEffect):
-                out[:, :, k] = self.signal_tangent(effect, shape, effects, parameters)
+                torque, slope = self.signal_tangent(effect, shape, effects, parameters)
+                # `moved` counts in ranges of the amount
+                out[:, :, k], slopes[:, k] = ((shape.upper - shape.lower) * part for part in (torque, slope))
                 continue
             own = values[starts[position] : starts[position + 1]]
             low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
@@ -396,20 +461,29 @@ class Bench:
                 (parts[1].link - parts[0].link) @ own / 2e-3, (parts[1].motor - parts[0].motor) @ own / 2e-3
             )
             out[:, :, k] = self._spectra(change, signal_effects(effects))
-        return out
+            if effect.side is Side.SPRING:
+                slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect))[:, 0]
+        return out, slopes
+
+    def links_of(self, effect: Effect) -> list[int]:
+        """Link equations of the joint of an effect."""
+        return [e for e in self._deflections if self.data.equations[e].joint == effect.joint]
 
     def signal_tangent(
         self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float]
-    ) -> ComplexArray:
-        """(H + 1, E) change of the model torque with the amount of an effect in the chain of signals.
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Change with the amount of an effect in the chain of signals.
 
         Bodies and rotors by the analytic derivatives of their torque, all other effects by differences.
+
+        Returns:
+            (H + 1, E) of the model torque, and (E,) of the stiffness of the springs.
         """
         signals = signal_effects(effects)
         step = 1e-4 * (amount.upper - amount.lower)
         here = float(getattr(effect, amount.name))
         others = tuple(s for s in signals if s != effect)
-        motions, rows = [], []
+        motions, rows, springs = [], [], []
         # what stands at another joint does not see this signal
         rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
         for sign in (-1.0, 1.0):
@@ -417,13 +491,16 @@ class Bench:
             motion = corrected_motion(self.robot, changed, self.data.motion)
             motions.append(motion)
             state = State(self.robot, motion, self.data.channels)
-            total = np.zeros((2, len(motion), self.robot.n))
+            total, spring = (np.zeros((2, len(motion), self.robot.n)) for _ in range(2))
             for e in rest:
                 own = np.array([parameters.get(c.name, 0.0) for c in e.columns(self.robot)])
                 if np.any(own):
                     part = e.evaluate(state)
                     total += np.stack([part.link @ own, part.motor @ own])
+                    if e.side is Side.SPRING:
+                        spring += np.stack([part.link @ own, part.motor @ own])
             rows.append(total)
+            springs.append(spring)
         change = (rows[1] - rows[0]) / (2.0 * step)
         base = self.state(effects)
         tangent = _bodies_tangent(self, base, motions[0], motions[1], parameters) / (2.0 * step)
@@ -432,7 +509,9 @@ class Bench:
         if type(effect).shifted is not Effect.shifted:
             moved_rows = self._shift_tangent(effect, amount, effects, parameters, step)
         part = Contribution(part.link + moved_rows.link, part.motor + moved_rows.motor)
-        return self._spectra(part, signals)[:, :, 0]
+        stiffer = (springs[1] - springs[0])[:, :, :, None] / (2.0 * step)
+        slopes = self.slopes_of(self._spectra(Contribution(stiffer[0], stiffer[1]), ()), self.links_of(effect))
+        return self._spectra(part, signals)[:, :, 0], slopes[:, 0]
 
     def _shift_tangent(
         self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float], step: float
@@ -492,20 +571,30 @@ class Bench:
         if not shapes:
             return None
         whitener, free = self.whitener(noise), self.free_basis(noise)
-        tangents = self.tangents(fit.effects, fit.columns, fit.values, shapes) * fit.scale[:, None]
+        bent = self.tangents(fit.effects, fit.columns, fit.values, shapes)
+        tangents = self.scaled(*bent, fit.residual, fit.scale, self.stiffness_of(fit))
         directions = _off(free, whiten(whitener, tangents))
         across = _off(fit.basis, directions)
         strength = np.linalg.norm(across, axis=0)
         if not np.any(strength > 1e-9):
             return None
-        normal = across.T @ across + (1e-3 * float(strength.max())) ** 2 * np.eye(len(strength))
-        step = np.linalg.solve(normal, across.T @ fit.whitened)
+        seen = strength > 1e-9
+        step = np.zeros(len(strength))
+        # every shape in its own unit: what one does may be a thousand times what another does
+        unit = across[:, seen] / strength[seen]
+        normal = unit.T @ unit + RIDGE * np.eye(int(seen.sum()))
+        step[seen] = np.linalg.solve(normal, unit.T @ fit.whitened) / strength[seen]
         step *= min(1.0, 1.0 / max(float(np.max(np.abs(step))), 1e-300))
+        rank = fit.covariance_factor.shape[1]
+        follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis[:, fit.basis.shape[1] - rank :].T @ directions)
         for _ in range(5):
             effects = list(fit.effects)
             for (position, shape), amount in zip(shapes, step, strict=True):
                 effects[position] = moved(effects[position], shape, float(amount))
-            new = self.fit(effects, noise, start=fit.parameters, tangents=False)
+            # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
+            ahead = fit.values + follow @ step
+            start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
+            new = self.fit(effects, noise, start=start, tangents=False)
             if new.statistic < fit.statistic:
                 return new
             step = step / 3.0

@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, Fit
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
-from sea_ident.effects import Effect, effect_classes
+from sea_ident.effects import Effect, Side, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
@@ -22,7 +22,7 @@ ONLY_AGAINST_REFERENCE = ("payload",)
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
 
-ABSORBED = 2e-5
+ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
 
 
@@ -102,23 +102,35 @@ def examine(
     effect: Effect,
 ) -> Candidate | None:
     """One candidate with its best shape, None where it cannot act on this robot or in this motion."""
+    slopes: FloatArray
     try:
         anchored = bench.anchored((*fit.effects, effect), fit.parameters)[-1]
         if isinstance(anchored, SignalEffect):
             shown = [bench.signal_tangent(anchored, amount, fit.effects, fit.parameters) for amount in anchored.amounts]
             variants: tuple[Effect, ...] = (anchored,)
             touched = np.arange(len(bench.data.equations))
-            spectra = np.stack(shown, axis=-1)[:, :, None, :]
+            spectra = np.stack([torque for torque, _ in shown], axis=-1)[:, :, None, :]
+            slopes = np.stack([slope for _, slope in shown], axis=-1)
         else:
             variants = _coarse(anchored).variants(bench.state(fit.effects))
             touched, spectra = bench.variant_spectra(variants, fit.effects)
+            slopes = np.zeros((len(touched), 0))
     except EffectError:
         return None
     harmonics, equations, count, width = spectra.shape
     if width == 0 or not np.any(spectra):
         return None
-    scaled = spectra.reshape(harmonics, equations, count * width) * fit.scale[touched][:, None]
-    flat = stacked(np.matmul(whitener[:, :, touched], scaled))
+    whole = np.zeros((harmonics, len(fit.scale), count * width), dtype=np.complex128)
+    whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
+    if anchored.side is Side.SPRING and not isinstance(anchored, SignalEffect):
+        slopes = bench.slopes_of(whole, bench.links_of(anchored))
+    if np.any(slopes):
+        scaled = bench.scaled(whole, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))
+    else:
+        scaled = np.asarray(whole * fit.scale[:, None], dtype=np.complex128)
+        slopes = np.zeros((len(fit.scale), count * width))
+    touched = np.union1d(touched, np.flatnonzero(np.any(slopes != 0.0, axis=1)))
+    flat = stacked(np.matmul(whitener[:, :, touched], scaled[:, touched]))
     norms = np.sqrt(np.sum(flat**2, axis=0))
     flat /= np.where(norms > 0.0, norms, 1.0)
     # single precision is plenty for a comparison of normalised columns, and half the work

@@ -217,11 +217,16 @@ def around_reversals(motion: Motion, equations: tuple[Equation, ...]) -> NDArray
     left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):
         of_link = equation.kind is EquationKind.LINK
-        speed = (motion.dq if of_link else motion.dtheta)[:, equation.index]
-        left_out[:, e] = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
-        crossing = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, 1)))
-        for shift in range(-REVERSAL_SAMPLES, REVERSAL_SAMPLES):
-            left_out[(crossing + shift) % len(speed), e] = True
+        left_out[:, e] = around_reversal((motion.dq if of_link else motion.dtheta)[:, equation.index])
+    return left_out
+
+
+def around_reversal(speed: FloatArray) -> NDArray[np.bool_]:
+    """(N,) whether a speed (N,) is about to change its sign."""
+    left_out = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
+    crossing = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, 1)))
+    for shift in range(-REVERSAL_SAMPLES, REVERSAL_SAMPLES):
+        left_out[(crossing + shift) % len(speed)] = True
     return left_out
 
 

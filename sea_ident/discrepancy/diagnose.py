@@ -8,6 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
+from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench, Fit
 from sea_ident.discrepancy.data import PeriodData, period_data, waveform, wide_processing
 from sea_ident.discrepancy.diagnosis import (
@@ -103,18 +104,20 @@ def diagnose(
         temperature = None
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
-    selection = search(bench, bench.effects)
+    basic = completed(bench)
+    selection = search(bench, bench.effects) if basic is None else basic.selection
     tell("comparing the periods", 0.5)
     trends = compare_periods(bench, selection.final.fit, selection.final.noise, temperature)
     tell("looking for alternatives", 0.6)
-    alternatives = assess.rivals(bench, selection)
+    alternatives = assess.rivals(bench, selection) if basic is None else {}
     tell("testing on held-out data", 0.75)
     held, held_notes = held_out(bench, selection, holdout)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, processed, selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
-    notes = replace(notes, warnings=(*notes.warnings, *held_notes, *forward.notes))
+    basic_notes = () if basic is None else basic.warnings
+    notes = replace(notes, warnings=(*notes.warnings, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
     diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes)
     diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
@@ -194,7 +197,7 @@ def _conclude(
         training=gap,
         holdout=held_gap,
         detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates),
-        warnings=tuple(dict.fromkeys((*notes.warnings, *words.reservations(facts, held is not None)))),
+        warnings=tuple(dict.fromkeys((*notes.warnings, *trends.notes, *words.reservations(facts, held is not None)))),
         waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
         recording=bench.data.source,
         holdout_source=None if held is None else held.source,

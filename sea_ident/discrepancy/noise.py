@@ -65,7 +65,7 @@ class NoiseFloor:
 
 def stacked(values: ComplexArray) -> FloatArray:
     """(E (2 H + 1), ...) real numbers from complex coefficients (H + 1, E, ...): constants, real, imaginary parts."""
-    rest = values[1:].reshape(-1, *values.shape[2:])
+    rest = values[1:].reshape((len(values) - 1) * values.shape[1], *values.shape[2:])
     return np.concatenate([values[0].real, rest.real, rest.imag])
 
 

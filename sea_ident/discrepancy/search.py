@@ -1,7 +1,7 @@
 """Which effects are missing: forward selection with a family-wise level, exchange, backward elimination."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -12,6 +12,7 @@ from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, whit
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
+from sea_ident.effects.signal import SignalEffect
 
 FAMILY_LEVEL = 1e-3
 """Probability of accepting anything where nothing is missing."""
@@ -38,7 +39,7 @@ FAR = 3.0
 """Statistic over degrees of freedom beyond which the shapes of the model are left alone, for they would bend to the
 misfit, ..."""
 
-BENT = 0.3
+BENT = 0.7
 """... unless that leaves less than this share of the excess: then they were what is wrong."""
 
 LARGE_TORQUE = 0.3
@@ -56,8 +57,14 @@ EXCUSED = 0.02
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
-FINALISTS = 5
-"""Candidates that are refitted with everything free before one is accepted."""
+FINALISTS = 4
+"""Candidates that are refitted with everything free before one is accepted, and the best of every kind beside them."""
+
+LAST_TWO = 2
+"""Of these the best are compared with the shapes of the model refined too."""
+
+CHALLENGERS = 3
+"""Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +128,7 @@ def settle_again(bench: Bench, fit: Fit) -> Settled:
     share = needed_share(bench, fit, plain, TOLERATED) if TOLERATED else 0.0
     noise = bench.with_remainder(plain, share)
     anchored = bench.anchored(fit.effects, fit.parameters)
+    bench.release(anchored)
     bent = bench.refine(anchored, noise, start=fit.parameters)
     if bent.statistic > FAR * bent.dof:
         straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
@@ -210,25 +218,69 @@ def _next(
     worth = [
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
     ]
-    best: tuple[float, Fit, float] | None = None
+    accepted: list[tuple[float, Fit, float]] = []
     periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
-    for candidate in worth[:FINALISTS]:
-        new = bench.refine((*fit.effects, candidate.effect), noise, start=fit.parameters, only=len(bench.effects))
+    for candidate in of_every_kind(worth, FINALISTS):
+        new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
             continue
         change = torque_change(bench, fit, new)
         own = own_torque(bench, new, -1)
-        cancels = own > LARGE_TORQUE and change < CANCELLED * own
+        cancels = own > LARGE_TORQUE and change < CANCELLED * own and not is_signal(candidate.effect)
         if min(change, 2.0 * own) < smallest or cancels or at_a_bound(new.effects[-1]):
             continue
         if scatter_p(periods, fit.whitened - new.whitened) > SCATTER_LEVEL:
             continue
-        score = new.statistic + penalty(candidate.effect, bench)
+        accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
+    if not accepted:
+        return None
+    accepted.sort(key=lambda item: item[0])
+    best: tuple[float, Fit, float] | None = None
+    for _, new, p_value in accepted[:LAST_TWO]:
+        whole = bench.refine(new.effects, noise, start=new.parameters) if len(accepted) > 1 else new
+        score = whole.statistic + penalty(new.effects[-1], bench)
         if best is None or score < best[0]:
             best = (score, new, p_value)
     return None if best is None else (best[1], best[2])
+
+
+def refitted(
+    bench: Bench,
+    before: Sequence[Effect],
+    effect: Effect,
+    after: Sequence[Effect],
+    noise: NoiseFloor,
+    start: Mapping[str, float],
+) -> Fit:
+    """A model with one effect more, its shapes refined from the best of several beginnings."""
+    begun = [effect]
+    if isinstance(effect, SignalEffect) and effect.beginnings:
+        first = effect.amounts[0].name
+        begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
+    fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
+    return min(fits, key=lambda fit: fit.statistic)
+
+
+def of_every_kind(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
+    """The first candidates, and the first of every side of the model that is not among them.
+
+    A first step along a tangent flatters what has many shapes, and says little about an effect in the chain of signals
+    whose amount is not small.
+    """
+    chosen = list(candidates[:count])
+    kinds = {kind_of(c.effect) for c in chosen}
+    for candidate in candidates[count:]:
+        if kind_of(candidate.effect) not in kinds:
+            chosen.append(candidate)
+            kinds.add(kind_of(candidate.effect))
+    return chosen
+
+
+def kind_of(effect: Effect) -> str:
+    """What an effect acts on: a side of the model, or which part of the chain of signals."""
+    return effect.name if is_signal(effect) else str(effect.side)
 
 
 def own_torque(bench: Bench, fit: Fit, position: int) -> float:
@@ -334,15 +386,11 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
         reduced = bench.fit(others, noise, start=fit.parameters)
         own = effect_key(fit.effects[position])
         best = fit
-        for candidate in [c for c in scan(bench, reduced, noise) if c.key != own][:2]:
-            if candidate.gain < 0.8 * (reduced.statistic - fit.statistic):
+        rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
+        for candidate in of_every_kind(rivals, CHALLENGERS):
+            if candidate.gain < 0.5 * (reduced.statistic - fit.statistic) and not is_signal(candidate.effect):
                 continue
-            new = bench.refine(
-                [*others[:position], candidate.effect, *others[position:]],
-                noise,
-                start=fit.parameters,
-                only=len(bench.effects),
-            )
+            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             better = best.statistic + penalty(best.effects[position], bench)
             if new.statistic + penalty(candidate.effect, bench) < better - 1.0 and physical(bench, new, position):
                 best = new

@@ -18,6 +18,9 @@ LEVEL = 1e-3
 MOST_TRENDS = 2
 """Largest number of trends that are named."""
 
+FEWEST_AFTER_START = 5
+"""Periods from which on the first may be left out as start-up."""
+
 SMALLEST_CHANGE = 1e-3
 """A trend must change the torque of an equation by this share of its rms over the recording, or it does not matter."""
 
@@ -53,21 +56,30 @@ class TrendTest:
         p_value: of no trend at all.
         trends: what is named, the strongest first.
         unnamed: whether a trend remains that no effect of the library explains.
+        notes: what a user should know.
     """
 
     p_value: float
     trends: tuple[Trend, ...]
     unnamed: bool
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class _Direction:
-    """A trend as columns: profile over the periods, and orthonormal whitened columns."""
+    """A trend as columns: profile over the periods, whitened columns and a basis of them, which columns they are."""
 
     effect: Effect
     profile: FloatArray
     columns: FloatArray
     basis: FloatArray
+    used: tuple[int, ...]
+    count: int
+
+    def over(self, periods: slice) -> "_Direction":
+        """The same in a part of the periods."""
+        profile = self.profile[periods]
+        return replace(self, profile=profile - profile.mean())
 
 
 def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: FloatArray | None = None) -> TrendTest:
@@ -94,6 +106,17 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     middle: FloatArray = (np.arange(periods, dtype=np.float64) + 0.5) * bench.data.period
     directions = _directions(bench, fit, whitener / np.sqrt(periods), free, middle, temperature)
     omnibus = _omnibus(flat, middle, noise)
+    notes: tuple[str, ...] = ()
+    if omnibus < LEVEL and periods > FEWEST_AFTER_START:
+        later = flat[1:] - flat[1:].mean(axis=0)
+        settled = _omnibus(later, middle[1:], noise)
+        if settled > LEVEL:
+            notes = (
+                f"{bench.data.source}: the first period differs from the {periods - 1} later ones, which are "
+                "alike: the motion was still settling. It was left out of the search for trends; start recording later",
+            )
+            flat, middle, omnibus, periods = later, middle[1:], settled, periods - 1
+            directions = [d.over(slice(1, None)) for d in directions]
     tests = max(len(directions), 1)
     named: list[tuple[_Direction, float, float]] = []
     left = flat
@@ -118,7 +141,7 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
         _trend(bench, flat, d, gain, p, directions, [o for o, _, _ in named if o is not d]) for d, gain, p in named
     )
     unnamed = _omnibus(left, middle, noise) < LEVEL if named else omnibus < LEVEL
-    return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed)
+    return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
 def trend_effects(bench: Bench) -> list[Effect]:
@@ -139,7 +162,7 @@ def _directions(
     temperature: FloatArray | None,
 ) -> list[_Direction]:
     state = bench.state(fit.effects)
-    found = []
+    found: list[_Direction] = []
     for plain in trend_effects(bench):
         effect = bench.anchored((*fit.effects, plain), fit.parameters)[-1]
         if not isinstance(effect, TrendEffect):
@@ -159,11 +182,16 @@ def _directions(
         norms = np.linalg.norm(columns, axis=0)
         if not np.all(norms > 0.0):
             continue
-        basis = np.linalg.qr(columns / norms)[0]
+        count = columns.shape[1]
+        choices = [tuple(range(count)), *((k,) for k in range(count) if count > 1)]
+        bases = [np.linalg.qr((columns / norms)[:, used])[0] for used in choices]
         for variant, change in zip(variants, changes, strict=True):
             profile = change - change.mean()
             if np.linalg.norm(profile) > 1e-12:
-                found.append(_Direction(variant, profile, columns, basis))
+                found.extend(
+                    _Direction(variant, profile, columns[:, used], basis, used, count)
+                    for used, basis in zip(choices, bases, strict=True)
+                )
     return found
 
 
@@ -176,7 +204,12 @@ def _time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...
 
 
 def _gain(flat: FloatArray, direction: _Direction) -> float:
+    """Drop of the statistic; none where columns that change by one cause would have to change in opposite ways."""
     along = direction.profile @ (flat @ direction.basis) / np.linalg.norm(direction.profile)
+    if len(direction.used) > 1:
+        values = _values(flat, direction)[list(direction.used)]
+        if np.any(values > 0.0) and np.any(values < 0.0):
+            return 0.0
     return float(along @ along)
 
 
@@ -227,8 +260,11 @@ def _change(bench: Bench, flat: FloatArray, direction: _Direction, periods: int)
 
 
 def _values(flat: FloatArray, direction: _Direction) -> FloatArray:
+    """(k,) estimates of all columns of the effect; those that are not used are zero."""
     along = direction.profile @ flat / float(direction.profile @ direction.profile)
-    return np.asarray(np.linalg.lstsq(direction.columns, along, rcond=1e-10)[0], dtype=np.float64)
+    out = np.zeros(direction.count)
+    out[list(direction.used)] = np.linalg.lstsq(direction.columns, along, rcond=1e-10)[0]
+    return out
 
 
 def _trend(
@@ -241,8 +277,9 @@ def _trend(
     others: list[_Direction],
 ) -> Trend:
     left = flat - _explained(flat, others) if others else flat
-    inverse = np.linalg.pinv(direction.columns)
     size = np.linalg.norm(direction.profile)
+    stds = np.zeros(direction.count)
+    stds[list(direction.used)] = np.linalg.norm(np.linalg.pinv(direction.columns), axis=1) / size
     alternatives: dict[tuple[str, str | None], tuple[Effect, float]] = {}
     explained = _explained(left, [direction])
     for other in directions:
@@ -258,7 +295,7 @@ def _trend(
     return Trend(
         effect=direction.effect,
         values=_values(left, direction),
-        stds=np.linalg.norm(inverse, axis=1) / size,
+        stds=stds,
         gain=gain,
         p_value=p_value,
         torque_change=_change(bench, left, direction, len(flat)),

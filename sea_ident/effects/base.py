@@ -323,6 +323,13 @@ class Effect(ABC):
         """The same effect, knowing what it needs of the rest of the model; by default it needs nothing."""
         return self
 
+    def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
+        """A speed (N,) at whose reversal its torque jumps, with the index of the joint; None for joint and motor speed.
+
+        Where that speed passes zero a sample tells nothing: it may be on either side of the jump.
+        """
+        return None
+
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
         """Whether estimates (k,) of its columns make sense beside the other parameters of a model, by name.
 

@@ -25,6 +25,8 @@ class EncoderOffset(SignalEffect):
     name: ClassVar[str] = "encoder_offset"
     source: ClassVar[str] = "Hollerbach, Khalil, Gautier, Model identification, Springer Handbook of Robotics, 2008"
     amounts: ClassVar[tuple[Shape, ...]] = (Shape("offset", "rad", -0.5, 0.5, logarithmic=False),)
+    # a stiffening spring bends the derivative at zero
+    beginnings: ClassVar[tuple[float, ...]] = (-0.01, 0.01)
 
     def corrected(self, robot: Robot, motion: Motion) -> Motion:
         """Q without the offset."""

@@ -12,18 +12,29 @@ from sea_ident.effects.base import (
     Column,
     Contribution,
     Effect,
+    Shape,
     Side,
     SimulationState,
     State,
     smooth_sign,
 )
 from sea_ident.exceptions import EffectError
+from sea_ident.motion import Motion
 from sea_ident.robot import Robot
+
+SMALLEST_RATIO = 1e-4
+"""Below this the derivative stands for the difference [-]."""
+
+LARGEST_RATIO = 1.0
+"""The Coulomb friction is turned over by no more than this [-]."""
 
 
 @dataclass(frozen=True)
 class TransmissionCoupling(Effect):
     """The motor of `joint` turns by theta + r q of another joint: its inertia and friction couple the two.
+
+    Its parameters are r times what the motor has: r J, r b and r c. So the model needs no other parameter to be known
+    beforehand but r itself, around which the sign of the Coulomb friction turns.
 
     Attributes:
         joint: joint of the motor.
@@ -32,6 +43,7 @@ class TransmissionCoupling(Effect):
         viscous: friction of the motor [N m s/rad].
         coulomb: friction of the motor [N m].
         smoothing: speed around which the sign is smoothed [rad/s].
+        ratio: r at which the Coulomb friction turns over: with the speed of the motor, not of the joint [-].
     """
 
     other: str | None = None
@@ -39,10 +51,13 @@ class TransmissionCoupling(Effect):
     viscous: float | None = None
     coulomb: float | None = None
     smoothing: float = 0.01
+    ratio: float = 0.0
 
     name: ClassVar[str] = "transmission_coupling"
     side: ClassVar[Side] = Side.BOTH
     source: ClassVar[str] = "Staubli RX-90 wrist; Gautier, Dynamic identification of robots with power model, ICRA 1997"
+
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("smoothing", "rad/s", 1e-4, 0.3),)
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:
@@ -57,47 +72,69 @@ class TransmissionCoupling(Effect):
         return tuple(cls(joint=joint, other=other) for joint, other in pairs)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
-        """The ratio r as the inertia of the motor shows it, and as its friction does."""
-        self._indices(robot)
+        """The ratio r times the inertia, the viscous and the Coulomb friction of the motor."""
+        i, _ = self._indices(robot)
+        torque, position = robot.joints[i].torque_unit, robot.joints[i].position_unit
+        units = (f"{torque} s2/{position}", f"{torque} s/{position}", torque)
         return tuple(
-            Column(self.parameter_name(f"{label}_from_{self.other}"), "-", self.name, self.joint, self.side)
-            for label in ("inertia", "friction")
+            Column(self.parameter_name(f"{label}_from_{self.other}"), unit, self.name, self.joint, self.side)
+            for label, unit in zip(("inertia", "viscous", "coulomb"), units, strict=True)
         )
 
     def evaluate(self, state: State) -> Contribution:
-        """First order in r: the motor feels the other link, and the other link feels the motor."""
+        """The motor feels the other link, and the other link feels the motor."""
         i, k = self._indices(state.robot)
         motion = state.motion
-        inertia, viscous, coulomb = self._motor(state.robot)
-        link, motor = (np.zeros((len(motion), state.robot.n, 2)) for _ in range(2))
-        sign = smooth_sign(motion.dtheta[:, i], self.smoothing)
-        slope = (1.0 - sign**2) / self.smoothing
-        motor[:, i, 0] = inertia * motion.ddq[:, k]
-        link[:, k, 0] = inertia * motion.ddtheta[:, i]
-        motor[:, i, 1] = (viscous + coulomb * slope) * motion.dq[:, k]
-        link[:, k, 1] = viscous * motion.dtheta[:, i] + coulomb * sign
+        link, motor = (np.zeros((len(motion), state.robot.n, 3)) for _ in range(2))
+        turned = motion.dtheta[:, i] + self.ratio * motion.dq[:, k]
+        sign = smooth_sign(turned, self.smoothing)
+        if abs(self.ratio) > SMALLEST_RATIO:
+            change = (sign - smooth_sign(motion.dtheta[:, i], self.smoothing)) / self.ratio
+        else:
+            change = (1.0 - sign**2) / self.smoothing * motion.dq[:, k]
+        motor[:, i, 0] = motion.ddq[:, k]
+        link[:, k, 0] = motion.ddtheta[:, i] + self.ratio * motion.ddq[:, k]
+        motor[:, i, 1] = motion.dq[:, k]
+        link[:, k, 1] = turned
+        motor[:, i, 2] = change
+        link[:, k, 2] = sign
         return Contribution(link, motor)
 
+    def variants(self, state: State) -> tuple["TransmissionCoupling", ...]:
+        """As it is: its smoothing is that of the Coulomb friction of the motor."""
+        return (self,)
+
+    def planted(self, robot: Robot, ratio: float) -> FloatArray:
+        """(3,) parameters of a motor of this description."""
+        return ratio * np.array(self._motor(robot))
+
+    def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
+        """The speed of the motor, which is not that of its joint."""
+        i, k = self._indices(robot)
+        return i, motion.dtheta[:, i] + self.ratio * motion.dq[:, k]
+
     def anchored(self, anchor: Anchor) -> "TransmissionCoupling":
-        """With the inertia and the friction of the motor in the model."""
+        """With the inertia and the friction of the motor in the model, and the ratio that follows from them."""
         i, _ = self._indices(anchor.robot)
         actuator = anchor.robot.joints[i].actuator
         inertia = 0.0
         if actuator is not None:
             inertia = anchor.value(f"{actuator.rotor_group}.rotor_inertia") * actuator.gear_ratio**2
-        return replace(
+        known = replace(
             self,
             reflected_inertia=inertia,
             viscous=anchor.value(f"{self.joint}.viscous_friction"),
             coulomb=anchor.value(f"{self.joint}.coulomb_friction"),
-            smoothing=anchor.smoothing(str(self.joint)) or self.smoothing,
+            smoothing=self.smoothing if self.coulomb else anchor.smoothing(str(self.joint)) or self.smoothing,
         )
+        values = np.array([anchor.value(column.name) for column in self.columns(anchor.robot)])
+        return replace(known, ratio=known._ratio(anchor.robot, values))
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The friction; the inertia acts in `modified`."""
         i, k = self._indices(robot)
         _, viscous, coulomb = self._motor(robot)
-        ratio = float(values[1])
+        ratio = self._ratio(robot, values)
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
             own, turned = state.dtheta[i], state.dtheta[i] + ratio * state.dq[k]
@@ -110,12 +147,21 @@ class TransmissionCoupling(Effect):
     def modified(self, robot: Robot, values: FloatArray) -> Robot:
         """The robot whose rotor turns with both joints."""
         i, k = self._indices(robot)
+        inertia = self._motor(robot)[0]
+        ratio = float(values[0]) / inertia if inertia > 0.0 else 0.0
         link_map = robot.link_map.copy()
         for index, rotor in zip(robot.rotor_indices, robot.rotors, strict=True):
             if rotor.joint == self.joint:
                 row = robot.extended_model.joints[int(index)].idx_v
-                link_map[row, k] += float(values[0]) * (robot.motor_map[row, i] + robot.link_map[row, i])
+                link_map[row, k] += ratio * (robot.motor_map[row, i] + robot.link_map[row, i])
         return replace(robot, link_map=link_map)
+
+    def _ratio(self, robot: Robot, values: FloatArray) -> float:
+        """R by the friction, the Coulomb friction first: it says it by where it turns over."""
+        _, viscous, coulomb = self._motor(robot)
+        amount, of = (values[2], coulomb) if coulomb > 0.0 else (values[1], viscous)
+        ratio = float(amount) / of if of > 0.0 else 0.0
+        return float(np.clip(ratio, -LARGEST_RATIO, LARGEST_RATIO))
 
     def _motor(self, robot: Robot) -> tuple[float, float, float]:
         actuator = robot.joints[self._indices(robot)[0]].actuator
