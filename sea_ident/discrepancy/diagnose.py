@@ -34,8 +34,9 @@ from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
-from sea_ident.processing import ProcessedRecording
+from sea_ident.processing import ProcessedRecording, process
 from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
 from sea_ident.simulation import Controller
 
 FEWEST_PERIODS = 10
@@ -114,7 +115,7 @@ def diagnose(
     held, held_notes = held_out(bench, selection, holdout)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
-    repaired = repaired_model(model, processed, selection.final.fit)
+    repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
     basic_notes = () if basic is None else basic.warnings
     notes = replace(notes, warnings=(*notes.warnings, *basic_notes, *held_notes, *forward.notes))
@@ -125,6 +126,17 @@ def diagnose(
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return diagnosis
+
+
+def _as_identified(
+    recording: Recording | ProcessedRecording, processed: ProcessedRecording, robot: Robot
+) -> ProcessedRecording:
+    """The recording as `identify` processes it: with the harmonics that the data ask for, not those compared here."""
+    if isinstance(recording, ProcessedRecording):
+        return recording
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        return process(recording, robot, period=processed.period)
 
 
 def _forward(
