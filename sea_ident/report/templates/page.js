@@ -131,4 +131,6 @@
       tip.style.top = e.clientY + 12 + "px";
     });
   document.addEventListener("scroll", () => { tip.style.opacity = 0; }, { passive: true });
+  // On paper nobody can unfold them.
+  window.addEventListener("beforeprint", () => { for (const folded of document.querySelectorAll("details")) folded.open = true; });
 })();

@@ -50,9 +50,12 @@
       line([cx + s, cy - size], [cx + s, cy + size]); line([cx - size, cy + s], [cx + size, cy + s]);
     }
   }
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  // Black parts would vanish on dark paper: colours begin higher there.
+  const lifted = (color) => (dark.matches ? color.map((c) => 90 + (c * 165) / 255) : color);
   function fill(part, width, height, project, bias) {
     // The bias settles which of two faces in one plane is seen, always the same way.
-    const { points, world, screen, faces, color } = part, m = 12 * part.body;
+    const { points, world, screen, faces } = part, color = lifted(part.color), m = 12 * part.body;
     for (let i = 0; i < points.length; i += 3) {
       const x = points[i], y = points[i + 1], z = points[i + 2];
       if (part.body < 0) { world[i] = x; world[i + 1] = y; world[i + 2] = z; }
