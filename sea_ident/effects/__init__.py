@@ -11,8 +11,8 @@ from inspect import getmembers, isabstract, isclass
 from pkgutil import iter_modules
 from typing import Any
 
+from sea_ident.effects.acting import Action, SimulationState
 from sea_ident.effects.base import (
-    Action,
     Anchor,
     Column,
     Contribution,
@@ -20,7 +20,6 @@ from sea_ident.effects.base import (
     JointEffect,
     Shape,
     Side,
-    SimulationState,
     State,
     corrected_motion,
     smooth_sign,

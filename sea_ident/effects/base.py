@@ -17,12 +17,13 @@ from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import product
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
+from sea_ident.effects.acting import Action, SimulationState
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -161,44 +162,6 @@ class State:
         if side is Side.SPRING:
             return Contribution(-rows, rows, index)
         return Contribution(nothing, rows if side is Side.MOTOR else nothing, index)
-
-
-@dataclass(frozen=True, eq=False)
-class SimulationState:
-    """State of the robot at one instant of a simulation.
-
-    Attributes:
-        time: from the start of the recording; its start while the motion settles [s].
-        q: (n,) link positions.
-        dq: (n,) link velocities.
-        theta: (n,) motor positions after the gear.
-        dtheta: (n,) motor velocities after the gear.
-        tau_spring: (n,) torques from the motor side onto the links: of the springs, or at a rigid joint what the
-            bodies need, where a `LoadEffect` asks for it [N m].
-        tau_motor: (n,) commanded motor torques at the joint side [N m].
-        elapsed: time since the last step that was accepted [s].
-    """
-
-    time: float
-    q: FloatArray
-    dq: FloatArray
-    theta: FloatArray
-    dtheta: FloatArray
-    tau_spring: FloatArray
-    tau_motor: FloatArray
-    elapsed: float = 0.0
-
-
-class Action(Protocol):
-    """How an effect acts in a simulation.
-
-    An effect with memory gives an action that also has a method ``accept(state)``: the simulator calls it with every
-    state that it keeps, and then only does the memory move on (trial steps and steps back leave it as it is). A trial
-    state lies `elapsed` after the last one that was kept. Each simulation asks for a new action.
-    """
-
-    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-        """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Anchor, Column, Contribution, Effect, Side, State
+from sea_ident.effects.acting import Action
+from sea_ident.effects.base import Anchor, Column, Contribution, Effect, Side, State
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Contribution, JointEffect, Shape, SimulationState, State
+from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.base import Contribution, JointEffect, Shape, State
 from sea_ident.robot import Robot
 
 _MINUTE = 60.0

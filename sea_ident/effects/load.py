@@ -8,16 +8,8 @@ from typing import Self
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import (
-    Action,
-    Anchor,
-    Contribution,
-    Effect,
-    Side,
-    SimulationState,
-    State,
-    smooth_sign,
-)
+from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.base import Anchor, Contribution, Effect, Side, State, smooth_sign
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, JointEffect, Side, SimulationState
+from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.base import JointEffect, Side
 from sea_ident.effects.signal import is_closed
 from sea_ident.robot import Robot
 

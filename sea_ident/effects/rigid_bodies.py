@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Column, Contribution, Effect, Side, State
+from sea_ident.effects.acting import Action
+from sea_ident.effects.base import Column, Contribution, Effect, Side, State
 from sea_ident.robot import INERTIAL_UNITS, Robot
 
 

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Column, Contribution, Effect, Side, State
+from sea_ident.effects.acting import Action
+from sea_ident.effects.base import Column, Contribution, Effect, Side, State
 from sea_ident.robot import Robot
 
 

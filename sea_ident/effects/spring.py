@@ -4,6 +4,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from sea_ident._typing import FloatArray
 from sea_ident.effects.base import JointEffect, Side, State
 from sea_ident.robot import Robot
 
@@ -17,6 +18,11 @@ class SpringEffect(JointEffect):
     def instances(cls, robot: Robot) -> tuple[Self, ...]:
         """At every elastic joint."""
         return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
+
+
+def stated(value: float | None) -> FloatArray:
+    """(1,) prior of one parameter: not a number where the robot's description does not state it."""
+    return np.array([np.nan if value is None else value])
 
 
 def deflections(state: State, joint: str, points: int) -> tuple[float, ...]:

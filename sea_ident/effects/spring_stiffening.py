@@ -6,12 +6,13 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Effect, JointEffect, Shape, Side
+from sea_ident.effects.base import Column, Shape
+from sea_ident.effects.spring import SpringEffect, stated
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class SpringStiffening(JointEffect):
+class SpringStiffening(SpringEffect):
     """K (theta - q) |theta - q|^(p-1); p = 3 is the paper's cubic stiffness.
 
     Attributes:
@@ -22,14 +23,8 @@ class SpringStiffening(JointEffect):
     exponent: float = 3.0
 
     name: ClassVar[str] = "spring_stiffening"
-    side: ClassVar[Side] = Side.SPRING
     source: ClassVar[str] = "Vantilt et al., ICRA 2015, eq. 21"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "-", 2.0, 3.0, logarithmic=False),)
-
-    @classmethod
-    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
-        """At every elastic joint."""
-        return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
@@ -44,5 +39,4 @@ class SpringStiffening(JointEffect):
 
     def prior(self, robot: Robot) -> FloatArray:
         """The annotation's cubic stiffness."""
-        value = robot.spring(self.required_joint).cubic_stiffness if self.exponent == 3.0 else None
-        return np.array([np.nan if value is None else value])
+        return stated(robot.spring(self.required_joint).cubic_stiffness if self.exponent == 3.0 else None)

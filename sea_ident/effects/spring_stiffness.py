@@ -3,25 +3,18 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Effect, JointEffect, Side
+from sea_ident.effects.base import Column
+from sea_ident.effects.spring import SpringEffect, stated
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class SpringStiffness(JointEffect):
+class SpringStiffness(SpringEffect):
     """K1 (theta - q)."""
 
     name: ClassVar[str] = "spring_stiffness"
-    side: ClassVar[Side] = Side.SPRING
     source: ClassVar[str] = "Vantilt et al., ICRA 2015, eq. 21"
-
-    @classmethod
-    def instances(cls, robot: Robot) -> tuple[Effect, ...]:
-        """At every elastic joint."""
-        return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
@@ -34,5 +27,4 @@ class SpringStiffness(JointEffect):
 
     def prior(self, robot: Robot) -> FloatArray:
         """The annotation's value."""
-        value = robot.spring(self.required_joint).stiffness
-        return np.array([np.nan if value is None else value])
+        return stated(robot.spring(self.required_joint).stiffness)

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Column, Contribution, Shape, Side, SimulationState, State
+from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.base import Column, Contribution, Shape, Side, State
 from sea_ident.effects.drift import TrendEffect, warming
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Action, Anchor, Column, Contribution, Side, SimulationState, State
+from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.base import Anchor, Column, Contribution, Side, State
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
 
