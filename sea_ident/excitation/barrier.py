@@ -13,7 +13,7 @@ import scipy.linalg
 
 from sea_ident._typing import FloatArray
 from sea_ident.excitation.criteria import Criterion
-from sea_ident.excitation.information import Information
+from sea_ident.excitation.information import Information, LocalModel
 from sea_ident.excitation.walls import Tangent, Wall
 
 _BOUNDARY = 0.95
@@ -133,11 +133,12 @@ def raise_inside(
     if placed is None:
         return coefficients
     point, sides = placed
-    value = criterion.value(information.matrix(point))
+    there = information.model(point)
+    value = criterion.value(there.matrix)
     forces = [barrier / side.slack for side in sides]
     damping, small = 1e-3, 0
     for _ in range(iterations):
-        gradient, curvature = quadratic_model(information, criterion, point)
+        gradient, curvature = quadratic_model(there, criterion)
         tangents = {k: wall.tangent(point) for k, wall in enumerate(walls) if _near(sides, k)}
         diagonal = np.diag(curvature).copy()
         found = -np.inf
@@ -150,7 +151,8 @@ def raise_inside(
             for halvings in range(4):
                 placed = place_inside(walls, middle, centre, point + 0.4**halvings * step.reshape(point.shape))
                 if placed is not None:
-                    found = criterion.value(information.matrix(placed[0]))
+                    there = information.model(placed[0])
+                    found = criterion.value(there.matrix)
                     if found > value:
                         break
             if found <= value:
@@ -170,9 +172,8 @@ def raise_inside(
     return point
 
 
-def quadratic_model(information: Information, criterion: Criterion, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(v,) exact gradient and (v, v) Gauss-Newton curvature of a criterion at (n, 2 L + 1) coefficients."""
-    there = information.model(point)
+def quadratic_model(there: LocalModel, criterion: Criterion) -> tuple[FloatArray, FloatArray]:
+    """(v,) exact gradient and (v, v) Gauss-Newton curvature of a criterion at a point."""
     local = criterion.local(there.matrix)
     gradient = there.gradient(local.derivative)
     changes = there.changes(local.vectors)

@@ -5,7 +5,7 @@ References:
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import ClassVar
 
@@ -14,6 +14,9 @@ import scipy.linalg
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect
+
+# sharpness of smooth forms in the last steps, as a multiple of their own
+_REFINED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,10 @@ class Criterion(ABC):
     def reported(self, matrix: FloatArray) -> float:
         """The number by which designs of this criterion are compared."""
         return self.value(matrix)
+
+    def refined(self) -> "Criterion":
+        """What to follow in the last steps, if the criterion is a smooth form of the reported number."""
+        return self
 
     def describe(self) -> str:
         """Its name, with what it is about."""
@@ -173,6 +180,10 @@ class EOptimality(SpectralCriterion):
 
     name: ClassVar[str] = "E"
 
+    def refined(self) -> Criterion:
+        """Nearer to the smallest eigenvalue."""
+        return replace(self, sharpness=_REFINED * self.sharpness)
+
     def of(self, eigenvalues: FloatArray) -> float:
         """Smooth minimum of the logarithms."""
         return _smallest(eigenvalues, self.sharpness)
@@ -208,6 +219,10 @@ class ConditionNumber(SpectralCriterion):
     sharpness: int = 8
 
     name: ClassVar[str] = "condition number"
+
+    def refined(self) -> Criterion:
+        """Nearer to the largest and smallest eigenvalues."""
+        return replace(self, sharpness=_REFINED * self.sharpness)
 
     def scaling(self, matrix: FloatArray) -> FloatArray:
         """One, or one over the norm of each column of F."""

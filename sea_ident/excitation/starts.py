@@ -1,4 +1,8 @@
-"""Several random starts: a short climb from each, a long one from the best."""
+"""Several random starts: a short climb from each, a longer one from the best, then moves around the best of these.
+
+A move draws the trajectories of some joints half way to random ones and climbs again. Good optima lie near good ones:
+moves raise log det further than as many fresh starts.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,9 +23,19 @@ from sea_ident.excitation.problem import Problem
 # samples per harmonic of the short and of the long climb
 _SCOUT_SAMPLES = 12
 _CLIMB_SAMPLES = 50
-_SCOUT_STEPS = 10
-_CLIMB_STEPS = 60
+_SCOUT_STEPS = 8
+_CLIMB_STEPS = 30
+_POLISH_STEPS = 60
 _DRAWS = 5
+# gains, in units of the criterion's tolerance, that end a climb which another one follows
+_COARSE = 30.0
+# moves at the same time; the best of them is where the next ones begin
+_TOGETHER = 4
+# of joints that a move draws to random trajectories, and how far
+_MOVED = 1.0 / 3.0
+_SHARE = 0.5
+# a move is given up if so many times its last gain would not bring it to the best
+_PATIENCE = 8.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +63,7 @@ class Found:
 
     Attributes:
         coefficients: (n, 2 L + 1) best trajectory, inside all limits.
-        values: criterion that each start reached, on the samples of the result.
+        values: criterion that each start reached on its own, on the samples of the result.
         interrupted: whether it was stopped from the keyboard.
     """
 
@@ -68,6 +82,7 @@ class _Board:
     lock: Lock = field(default_factory=Lock)
     latest: dict[int, FloatArray] = field(default_factory=dict)
     steps: dict[int, int] = field(default_factory=dict)
+    values: dict[int, float] = field(default_factory=dict)
     best: float = -np.inf
 
     def note(self, start: int, value: float, coefficients: FloatArray) -> bool:
@@ -106,7 +121,7 @@ def climb_from_starts(
 
     interrupted = False
     try:
-        parallel = Parallel(n_jobs=min(jobs, count), prefer="threads")
+        parallel = Parallel(n_jobs=min(jobs, max(count, _TOGETHER)), prefer="threads")
         # whoever chose another backend, such as a cluster, has it: its workers share no memory with this process
         shared = bool(getattr(get_active_backend(prefer="threads")[0], "supports_sharedmem", False))
         if shared:
@@ -123,15 +138,27 @@ def climb_from_starts(
         else:
             points = parallel(delayed(_climb_apart)(problem, starts, start, board.latest[start]) for start in order)
             board.latest.update(zip(order, points, strict=True))
+        board.values = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
+        best = max(order, key=lambda start: board.values[start])
+        information = _detailed(problem, board.latest[best])
+        for first in range(0, count, _TOGETHER):
+            base = board.latest[best]
+            moved = parallel(
+                delayed(_move)(problem, information, base, [seed, move, 1], board.stop)
+                for move in range(first, min(first + _TOGETHER, count))
+            )
+            value, point = max(moved, key=lambda pair: pair[0])
+            if value > problem.value(information, base):
+                board.note(best, value, point)
+        _polish(problem, information, board, best)
     except KeyboardInterrupt:
         board.stop.set()
         if not board.latest:
             raise
         interrupted = True
-    settled = {start: problem.settle(point) for start, point in sorted(board.latest.items())}
-    values = {start: problem.value(problem.fine, point) for start, point in settled.items()}
-    best = max(values, key=lambda start: values[start])
-    return Found(settled[best], tuple(values.values()), interrupted)
+    reached = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
+    best = max(reached, key=lambda start: reached[start])
+    return Found(problem.settle(board.latest[best]), tuple((board.values or reached).values()), interrupted)
 
 
 def _scout(problem: Problem, board: _Board, seed: int, given: FloatArray | None, start: int) -> float:
@@ -160,13 +187,65 @@ def _scout(problem: Problem, board: _Board, seed: int, given: FloatArray | None,
 
 
 def _climb(problem: Problem, board: _Board, start: int) -> None:
+    """Climb until little is left to gain."""
+    information = _detailed(problem, board.latest[start])
+    criterion = problem.criterion
+    _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, _COARSE * criterion.tolerance)
+
+
+def _polish(problem: Problem, information: Information, board: _Board, start: int) -> None:
     """Climb to the end."""
-    point = board.latest[start]
+    criterion = problem.criterion.refined()
+    _raise(problem, information, criterion, board, start, _POLISH_STEPS, 1e-5, criterion.tolerance)
+
+
+def _detailed(problem: Problem, point: FloatArray) -> Information:
+    """Information on so many samples that little is missed."""
     samples = min(problem.fine.sampling.samples, _CLIMB_SAMPLES * problem.harmonics)
     spacing = 1.0 / (problem.base_frequency * samples)
-    information = problem.coarse(samples, 0.5 * spacing * _speed(problem, point, derivative=2))
-    criterion = problem.criterion
-    _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, criterion.tolerance)
+    return problem.coarse(samples, 0.5 * spacing * _speed(problem, point, derivative=2))
+
+
+def _move(
+    problem: Problem, information: Information, base: FloatArray, seed: list[int], stop: Event
+) -> tuple[float, FloatArray]:
+    """Draw some joints half way to a random trajectory and climb from there.
+
+    Args:
+        problem: what to raise, inside what.
+        information: by which it is judged.
+        base: (n, 2 L + 1) trajectory, inside.
+        seed: of the random numbers.
+        stop: tells to stop.
+
+    Returns:
+        Criterion and coefficients.
+    """
+    generator = np.random.default_rng(seed)
+    n = len(base)
+    other = random_start(problem.limits, problem.base_frequency, problem.centre, generator)
+    joints = generator.permutation(n)[: max(1, round(_MOVED * n))]
+    point = base.copy()
+    point[joints] += _SHARE * (other[joints] - point[joints])
+    goal, last = problem.value(information, base), -np.inf
+
+    def hopeless(value: float, _: FloatArray) -> bool:
+        nonlocal last
+        gain, last = value - last, value
+        return stop.is_set() or value + _PATIENCE * gain < goal
+
+    point = raise_inside(
+        information,
+        problem.criterion,
+        problem.walls,
+        problem.centre,
+        _loosen(problem, point),
+        iterations=_CLIMB_STEPS,
+        barrier=1e-2,
+        tolerance=_COARSE * problem.criterion.tolerance,
+        report=hopeless,
+    )
+    return problem.value(information, point), point
 
 
 def _scout_apart(

@@ -61,7 +61,7 @@ def cost(robot: Robot, harmonics: int, samples: int) -> str:
     derivative = criterion.local(local.matrix).derivative
     matrix = seconds(lambda: information.matrix(point))
     gradient = seconds(lambda: local.gradient(derivative))
-    both = seconds(lambda: quadratic_model(information, criterion, point))
+    both = seconds(lambda: quadratic_model(local, criterion))
     begin = time.process_time()
     steps: list[float] = []
     raise_inside(
@@ -71,7 +71,7 @@ def cost(robot: Robot, harmonics: int, samples: int) -> str:
     if not steps:
         raise RuntimeError(f"no step was taken with {robot.n} joints, {harmonics} harmonics, {samples} samples")
     step = (time.process_time() - begin) / len(steps)
-    cells = (matrix, gradient, both - matrix - gradient, step)
+    cells = (matrix, gradient, both - gradient, step)
     return f"{robot.n:6d} {harmonics:9d} {samples:7d} {len(model.names):7d} {point.size:12d}  " + " ".join(
         f"{1e3 * cell:9.1f}" for cell in cells
     )

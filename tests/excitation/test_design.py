@@ -126,7 +126,7 @@ def test_progress_rises_within_every_start(exo):
 
 def test_every_criterion_is_best_in_its_own_sense(exo):
     criteria = [DOptimality(), AOptimality(), EOptimality(), ConditionNumber()]
-    found = [design_excitation(exo, seed=0, criterion=criterion, **SMALL) for criterion in criteria]
+    found = [design_excitation(exo, seed=2, criterion=criterion, **SMALL) for criterion in criteria]
     model, _ = design_model(exo, reduced_effects(exo), DOptimality(), None)
     matrices = []
     for excitation in found:
