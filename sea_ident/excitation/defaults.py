@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sea_ident.excitation.limit_checks import checked_limits
 from sea_ident.robot import Limits, Robot
 
 
@@ -15,7 +16,11 @@ def default_limits(robot: Robot, limits: Limits, notes: list[str]) -> Limits:
         robot: the robot.
         limits: its limits.
         notes: every default that is used is added here.
+
+    Raises:
+        ExcitationError: limits that do not fit the robot.
     """
+    limits = checked_limits(robot, limits)
     lower, upper, velocity = limits.lower.copy(), limits.upper.copy(), limits.velocity.copy()
     for i, joint in enumerate(robot.joints):
         reach, unit = (1.0, "m") if joint.prismatic else (np.pi, "rad")

@@ -12,6 +12,7 @@ from sea_ident.exceptions import ExcitationError, SeaIdentWarning
 from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.defaults import default_limits
 from sea_ident.excitation.design_model import design_model, reduced_effects
+from sea_ident.excitation.limit_checks import as_numbers
 from sea_ident.excitation.problem import Problem
 from sea_ident.excitation.ramp import Ramp
 from sea_ident.excitation.result import Excitation
@@ -73,7 +74,11 @@ def design_excitation(
         ExcitationError: other input that cannot be used.
     """
     begin = time.perf_counter()
+    for name, number in (("harmonics", harmonics), ("starts", starts), ("seed", seed), ("jobs", jobs)):
+        _check_whole(name, number, least=-np.inf if name == "jobs" else 0)
     samples = _check_sampling(base_frequency, harmonics, starts, rate)
+    if effects is not None and not effects:
+        raise ExcitationError("effects is empty; name those whose parameters are to be told, or leave it out")
     if jobs == 0:
         raise ExcitationError("jobs is 0; give at least 1, or -1 for one per core")
     notes: list[str] = []
@@ -106,7 +111,7 @@ def design_excitation(
 
 
 def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> FloatArray:
-    coefficients = np.asarray(start, dtype=np.float64)
+    coefficients = as_numbers("start", start)
     if coefficients.shape != problem.centre.shape or not np.all(np.isfinite(coefficients)):
         raise ExcitationError(
             f"start is {coefficients.shape}; it must hold {problem.centre.shape} finite coefficients, as "
@@ -116,6 +121,11 @@ def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> Float
     if outside:
         notes.append(f"the given start is outside the limits; it was moved inside: {', '.join(outside)}")
     return coefficients
+
+
+def _check_whole(name: str, number: object, least: float) -> None:
+    if not isinstance(number, (int, np.integer)) or number < least:
+        raise ExcitationError(f"{name} is {number!r}; it must be a whole number of at least {least}")
 
 
 def _check_sampling(base_frequency: float, harmonics: int, starts: int, rate: float) -> int:

@@ -194,8 +194,8 @@ def linear_limits(robot: Robot, limits: Limits) -> LinearLimits:
             raise ExcitationError(f"limit {name}: is NaN; give a number, or infinity for no limit")
         if lower > upper or np.isposinf(lower) or np.isneginf(upper):
             raise ExcitationError(f"limit {name}: lower limit {lower:g} {unit} is above upper limit {upper:g} {unit}")
-        if lower == upper:
-            raise ExcitationError(f"limit {name}: the range is zero ({lower:g} {unit}); nothing could move. Lock the "
+        if lower == upper or upper - lower <= 1e-9 * max(1.0, abs(lower) if np.isfinite(lower) else 1.0):
+            raise ExcitationError(f"limit {name}: the range is zero ({upper:g} {unit}); nothing could move. Lock the "
                                   f"joint (joints=...) or widen the limit")  # fmt: skip
         if np.isfinite(lower) or np.isfinite(upper):
             names.append(name)

@@ -14,6 +14,7 @@ from sea_ident.excitation.design_model import DesignModel
 from sea_ident.excitation.dynamic_limits import DynamicLimits, dynamic_limits
 from sea_ident.excitation.feasibility import at_rest, comfortable_position, shrink
 from sea_ident.excitation.information import Information
+from sea_ident.excitation.limit_checks import as_numbers
 from sea_ident.excitation.linear_limits import LinearLimits, linear_limits
 from sea_ident.excitation.ramp import Ramp, RampMotion, design_ramp, design_ramp_out
 from sea_ident.excitation.result import Excitation
@@ -291,7 +292,7 @@ def _smoothed(effect: Effect, robot: Robot, smoothing: FloatArray) -> Effect:
 def _row_weights(model: DesignModel, noise: FloatArray | None) -> FloatArray:
     """(R,) one over the standard deviation of each row."""
     n, rows = model.columns.robot.n, model.columns.rows
-    deviation = np.ones(rows) if noise is None else np.asarray(noise, dtype=np.float64)
+    deviation = np.ones(rows) if noise is None else as_numbers("noise", noise)
     if deviation.shape == (n,) and rows == 2 * n:
         deviation = np.tile(deviation, 2)
     if deviation.shape != (rows,) or not np.all(np.isfinite(deviation) & (deviation > 0.0)):
@@ -302,7 +303,7 @@ def _row_weights(model: DesignModel, noise: FloatArray | None) -> FloatArray:
 def _collected(model: DesignModel, collected: FloatArray | None) -> FloatArray:
     """(p, p) information that is there already."""
     p = len(model.columns.chosen)
-    prior = np.zeros((p, p)) if collected is None else np.asarray(collected, dtype=np.float64)
+    prior = np.zeros((p, p)) if collected is None else as_numbers("information", collected)
     if prior.shape != (p, p) or not np.all(np.isfinite(prior)):
         raise ExcitationError(
             f"information is {prior.shape}; it must be a finite ({p}, {p}) matrix about {', '.join(model.names)}"

@@ -14,6 +14,7 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.chain import Chain
 from sea_ident.excitation.collision_shapes import Pair, Shape, collision_shapes, separations, watched_pairs
+from sea_ident.excitation.limit_checks import as_numbers
 from sea_ident.robot import HalfSpace, Limits, Robot
 
 ROUNDING: float = 1e-5
@@ -242,7 +243,7 @@ def _plane(robot: Robot, chain: Chain, half: HalfSpace) -> Plane:
     if frame_id >= robot.model.nframes:
         links = ", ".join(frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY)
         raise ExcitationError(f"{where}: {robot.name} has no link {half.link!r}; its links: {links}")
-    normal, point = np.asarray(half.normal, dtype=np.float64), np.asarray(half.point, dtype=np.float64)
+    normal, point = as_numbers(f"{where}: its normal", half.normal), as_numbers(f"{where}: its point", half.point)
     if normal.shape != (3,) or point.shape != (3,) or not np.all(np.isfinite([*normal, *point, half.offset])):
         raise ExcitationError(f"{where}: normal and point must be three finite numbers each, the offset one")
     length = float(np.linalg.norm(normal))

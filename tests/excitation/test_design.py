@@ -298,11 +298,41 @@ def test_other_robots(robot_of, name):
         ({"noise": np.array([1.0, 0.0, 1.0])}, "3 positive standard deviations"),
         ({"start": np.zeros((2, 9))}, r"must hold \(3, 9\) finite coefficients"),
         ({"start": np.full((3, 9), np.nan)}, "finite coefficients"),
+        ({"start": "home"}, "start is 'home'; give an array of numbers"),
+        ({"noise": "low"}, "noise is 'low'"),
+        ({"information": "much"}, "information is 'much'"),
+        ({"harmonics": 2.5}, "harmonics is 2.5; it must be a whole number"),
+        ({"harmonics": 1000}, "1000 harmonics of 0.1 Hz reach 100 Hz, which is not below half the sampling rate"),
+        ({"seed": -1}, "seed is -1"),
+        ({"effects": ()}, "effects is empty"),
     ],
 )
 def test_bad_input(exo, changes, says):
     with pytest.raises(ExcitationError, match=says):
         design_excitation(exo, **{"harmonics": 4, "starts": 1, **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"lower": np.zeros(2)}, r"limits.lower: has shape \(2,\); it must be \(3,\)"),
+        ({"velocity": 2.0}, r"limits.velocity: has shape \(\)"),
+        ({"torque": "strong"}, "limits.torque is 'strong'"),
+        ({"velocity": np.array([np.nan, 1.0, 1.0])}, "hip.velocity: is NaN"),
+        ({"torque": np.array([1.0, np.nan, 1.0])}, "knee.torque: is nan"),
+        ({"deflection": np.array([1.0, 1.0, -1.0])}, "ankle.deflection: is -1"),
+        ({"velocity": np.array([0.0, 1.0, 1.0])}, "hip.velocity: the range is zero"),
+        ({"upper": np.array([1e-12, 0.0, 1.0])}, "hip.position: the range is zero"),
+        ({"upper": np.array([-1.0, 0.0, 1.0])}, "hip.position: lower limit 0 rad is above upper limit -1 rad"),
+        ({"upper": np.full(3, 1e300)}, "limits.upper: .* is larger than any robot"),
+        ({"combinations": np.eye(3)}, r"limits.combinations: has shape \(3, 3\); it must be \(1, 3\) \(1 names"),
+        ({"combinations": np.full((1, 3), np.nan)}, "not finite"),
+        ({"combination_lower": np.zeros(0)}, "limits.combination_lower: has shape"),
+    ],
+)
+def test_limits_that_make_no_sense(exo, changes, says):
+    with pytest.raises(ExcitationError, match=says):
+        design_excitation(exo, limits=exo.limits.replace(**changes), **SMALL)
 
 
 def test_springs_without_predicted_motors(exo):
