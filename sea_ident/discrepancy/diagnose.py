@@ -10,6 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.data import PeriodData, period_data, waveform, wide_processing
 from sea_ident.discrepancy.diagnosis import (
     Alternative,
@@ -23,18 +24,19 @@ from sea_ident.discrepancy.diagnosis import (
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import HeldOut, held_out
-from sea_ident.discrepancy.lack import lack_of_fit
+from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, needed_share, own_torque, search
+from sea_ident.discrepancy.search import Selection, own_torque, search
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
+from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
-from sea_ident.processing import ProcessedRecording, process
+from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation import Controller
@@ -95,9 +97,14 @@ def diagnose(
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         processed = wide_processing(recording, robot, period or _period_of(model, recording))
     if processed.period is None or processed.periods < 2:
-        from sea_ident.discrepancy.unrepeated import diagnose_unrepeated
-
         return diagnose_unrepeated(model, processed, recording)
+    if processed.periods < FEWEST_PERIODS and isinstance(recording, Recording):
+        pushes = pushes_between_passes(model, recording, processed)
+        if pushes:
+            with python_warnings.catch_warnings():
+                python_warnings.simplefilter("ignore", SeaIdentWarning)
+                stretch = filter_recording(recording, robot)
+            return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
     whole = period_data(processed, robot)
     temperature = check.temperatures(recording, whole)
     data, notes = check.cleaned(whole, recording)
@@ -117,7 +124,7 @@ def diagnose(
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
-    basic_notes = () if basic is None else basic.warnings
+    basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
     notes = replace(notes, warnings=(*notes.warnings, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
     diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes)
@@ -184,8 +191,7 @@ def _conclude(
     start, final = selection.start, selection.final
     statistic, dof, p_value = lack_of_fit(bench, start)
     left, left_dof, left_p = lack_of_fit(bench, final)
-    plain = final.noise.with_remainder(np.zeros_like(final.noise.remainder))
-    remainder = needed_share(bench, final.fit, plain, 1.0) if left_p < LACK_LEVEL else 0.0
+    remainder = remainder_share(bench, final) if left_p < LACK_LEVEL else 0.0
     missing = [*_missing(bench, selection, alternatives, held), *(_missing_trend(bench, t) for t in trends.trends)]
     if change is not None:
         missing.extend(change.missing)
@@ -237,7 +243,7 @@ def _verdict(
         return Verdict.NONE
     if any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
         return Verdict.SUSPECT
-    if large and unexplained > UNEXPLAINED:
+    if large and unexplained > UNEXPLAINED and not trends.trends:
         return Verdict.NOT_IN_LIBRARY
     if any(m.alternatives for m in structural):
         return Verdict.AMBIGUOUS

@@ -1,28 +1,369 @@
-"""Recordings without periods: a weaker comparison, without a noise floor and without names."""
+"""Recordings without periods, and recordings in which something pushes: a weaker comparison of one stretch.
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, Gap, LackOfFit, Verdict
+Without repetition nothing tells noise from what a model lacks. So what the model leaves is the noise, nothing is said
+about lack of fit, and the words are limited: `none` and `named` are never said. An effect is told only if
+
+- it explains more of the residual than one of the library would by chance in noise of that spectrum, and
+- with it, blocks of the recording are predicted better from the other blocks, in three blocks of four, and
+- what is explained matters: at least a tenth of the power of the residual.
+"""
+
+import warnings as python_warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy import assess, circular
+from sea_ident.discrepancy.base_model import completed
+from sea_ident.discrepancy.bench import Fit
+from sea_ident.discrepancy.candidates import Candidate, candidate_effects, scan
+from sea_ident.discrepancy.diagnosis import (
+    Alternative,
+    Diagnosis,
+    Gap,
+    LackOfFit,
+    Location,
+    MissingEffect,
+    MissingParameter,
+    Verdict,
+)
+from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, find_pushes, pushed
+from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.search import (
+    FAMILY_LEVEL,
+    Settled,
+    at_a_bound,
+    own_torque,
+    physical,
+    settle,
+    settle_again,
+    significance,
+)
+from sea_ident.discrepancy.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
+from sea_ident.effects import Effect, make_effect, spring_effects
 from sea_ident.estimation import Model
-from sea_ident.processing import ProcessedRecording
+from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.processing import ProcessedRecording, filter_recording
+from sea_ident.processing.variance import noise_from_curvature
 from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
+
+SMALLEST_GAIN = 0.1
+"""Share of the squared error of blocks left out that an effect must take away."""
+
+MOST_FOUND = 3
+"""Largest number of effects that are told of one stretch, beside basic terms."""
+
+TRIED = 4
+"""Candidates that are tried in every step."""
+
+AFTER_PUSH = 0.05
+"""Time after a push that says nothing about the model [s]."""
+
+MOST_ALIKE = 0.05
+"""A candidate that comes within this share of the gain of the best is not told from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """An effect that one stretch speaks for."""
+
+    effect: Effect
+    p_value: float
+    better: int
+    gain: float
+    alternatives: tuple[Alternative, ...]
+
+
+def pushes_between_passes(model: Model, recording: Recording, processed: ProcessedRecording) -> tuple[Push, ...]:
+    """Pushes in a recording whose motion repeats itself: they come once, at other phases, and spoil every mean.
+
+    Args:
+        model: the model.
+        recording: the recording.
+        processed: the same, cut to periods.
+
+    Returns:
+        Pushes; none where there are too few passes to tell, or where the model cannot be compared.
+    """
+    if processed.period is None or recording.duration < FEWEST_PASSES * processed.period:
+        return ()
+    try:
+        with python_warnings.catch_warnings():
+            python_warnings.simplefilter("ignore", SeaIdentWarning)
+            whole = filter_recording(recording, model.robot)
+        predicted = model.predict(whole.motion, whole.channels)
+    except SeaIdentError:
+        return ()
+    samples = round(processed.period / whole.interval)
+    return find_pushes(whole.motion.time, whole.tau_motor - predicted, whole.motion.dtheta, samples)
 
 
 def diagnose_unrepeated(
-    model: Model, processed: ProcessedRecording, recording: Recording | ProcessedRecording
+    model: Model,
+    processed: ProcessedRecording,
+    recording: Recording | ProcessedRecording,
+    pass_samples: int = 0,
 ) -> Diagnosis:
-    """Say what can still be said of one pass."""
+    """Say what can still be said of one stretch.
+
+    Args:
+        model: the model; its parameters are refitted.
+        processed: the stretch.
+        recording: what it comes from.
+        pass_samples: samples of one pass of a motion that repeats itself, 0 where it does not.
+
+    Returns:
+        The diagnosis, in weaker words.
+    """
     robot = model.robot
-    residual = processed.tau_motor - model.predict(processed.motion, processed.channels)
-    rms = {joint: float((residual[:, i] ** 2).mean() ** 0.5) for i, joint in enumerate(robot.joint_names)}
-    zero = dict.fromkeys(robot.joint_names, 0.0)
-    text = (
-        "One pass only, without repetition: there is no noise floor to judge the residual by, so nothing can be named. "
-        "Record the same motion ten times or more."
+    springs = spring_effects(robot) if robot.elastic_indices.size else ()
+    effects = (*model.effects, *springs)
+    motion = processed.motion
+    pushes: tuple[Push, ...] = ()
+    bench = StretchBench(stretch_data(processed, robot), effects)
+    start = settle(bench, effects)
+    for _ in range(2):
+        basic = completed(bench)
+        now = start if basic is None else basic.selection.final
+        found_now = find_pushes(motion.time, full_residual(bench, now.fit), motion.dtheta, pass_samples)
+        if found_now == pushes:
+            break
+        pushes = found_now
+        left_out = np.stack([pushed(pushes, motion.time, i, AFTER_PUSH) for i in range(robot.n)], axis=1)
+        bench = StretchBench(stretch_data(processed, robot, left_out), effects)
+        start = settle(bench, effects)
+    basic = completed(bench)
+    if basic is None:
+        now, found = _search(bench, start)
+        added = len(found)
+    else:
+        now, added = basic.selection.final, basic.selection.added
+        found = _confirmed(bench, start, now, basic.selection.p_values)
+    missing = [*_missing(bench, now.fit, found, added), *_missing_pushes(processed, robot, pushes)]
+    missing.sort(key=lambda m: -m.torque_share)
+    verdict = _verdict(missing)
+    gap = _gap(bench, start.fit, now.fit, pushes)
+    notes = [text for text in processed.warnings if "no period" not in text]
+    notes.extend(() if basic is None else basic.warnings)
+    notes.extend(circular.circular_springs(robot, recording))
+    notes.append(
+        "one stretch without a mean of periods: what the model leaves counts as noise, nothing is said about lack of "
+        f"fit, and what is told rests on the prediction of {BLOCKS} blocks from each other, which is weaker than "
+        "periods. Record the same motion ten times or more"
     )
-    return Diagnosis(
-        verdict=Verdict.CANNOT_TELL,
-        text=text,
+    repaired = None if pushes else repaired_model(model, processed, now.fit)
+    diagnosis = Diagnosis(
+        verdict=verdict,
+        text=_text(robot.joint_names, verdict, missing, gap, pushes, found),
         lack_of_fit=LackOfFit(0.0, 0, 1.0, 1.0, {joint: {} for joint in robot.joint_names}),
-        training=Gap(rms, rms, zero),
-        warnings=(*processed.warnings, "no periods: weaker mode, no effect is named"),
+        locations=tuple(
+            Location(
+                robot.joint_names[p.joint], "link" if robot.elastic[p.joint] else "sum",
+                f"push, time {p.start:.4g} to {p.stop:.4g} s", abs(p.force), p.z,
+            )
+            for p in pushes
+        ),
+        missing=tuple(missing),
+        training=gap,
+        detectability=assess.detectability(bench, now.fit, now.noise, _candidates(bench, now)),
+        warnings=tuple(dict.fromkeys(notes)),
+        model=repaired,
         recording=processed.source,
+    )  # fmt: skip
+    for text in diagnosis.warnings:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+    return diagnosis
+
+
+def _candidates(bench: StretchBench, now: Settled) -> list[Candidate]:
+    """Every effect of the library but pushes, which are looked for in time."""
+    wanted = [effect for effect in candidate_effects(bench, now.fit.effects) if effect.name != "external_force"]
+    return scan(bench, now.fit, now.noise, wanted)
+
+
+def _search(bench: StretchBench, start: Settled) -> tuple[Settled, list[_Found]]:
+    """Effects that one stretch speaks for, one after the other."""
+    now = start
+    found: list[_Found] = []
+    while len(found) < MOST_FOUND:
+        candidates = _candidates(bench, now)
+        tests = max(sum(c.tests for c in candidates), 1)
+        without = block_errors(bench, now.fit.effects, now.noise)
+        passed: list[tuple[float, Fit, _Found]] = []
+        for candidate in candidates[:TRIED]:
+            if candidate.gain <= 0.0:
+                break
+            fit = now.fit
+            new = bench.refine((*fit.effects, candidate.effect), now.noise, start=fit.parameters, only=len(fit.effects))
+            gain = fit.statistic - new.statistic
+            p_value = significance(gain, candidate.columns, tests, fit, now.noise)
+            if p_value > FAMILY_LEVEL or not physical(bench, new, -1) or at_a_bound(new.effects[-1]):
+                continue
+            errors = block_errors(bench, new.effects, now.noise)
+            better = int(np.count_nonzero(errors < without))
+            share = 1.0 - float(errors.sum() / without.sum())
+            if better < BETTER * BLOCKS or share < SMALLEST_GAIN:
+                continue
+            passed.append((gain, new, _Found(new.effects[-1], p_value, better, share, ())))
+        if not passed:
+            break
+        passed.sort(key=lambda item: -item[0])
+        gain, new, best = passed[0]
+        alike = tuple(
+            Alternative(other.effect.name, other.effect.joint, float(other_gain / gain))
+            for other_gain, _, other in passed[1:]
+            if other_gain > (1.0 - MOST_ALIKE) * gain
+        )
+        found.append(replace(best, alternatives=alike))
+        now = settle_again(bench, new)
+    return now, found
+
+
+def _confirmed(bench: StretchBench, start: Settled, now: Settled, p_values: tuple[float, ...]) -> list[_Found]:
+    """Basic terms, with what they are worth for the prediction of blocks from each other."""
+    effects = now.fit.effects
+    with_all = block_errors(bench, effects, now.noise)
+    found = []
+    for k, p_value in enumerate(p_values):
+        position = len(start.fit.effects) + k
+        without = block_errors(bench, [e for i, e in enumerate(effects) if i != position], now.noise)
+        better = int(np.count_nonzero(with_all < without))
+        found.append(_Found(effects[position], p_value, better, 1.0 - float(with_all.sum() / without.sum()), ()))
+    return found
+
+
+def _missing(bench: StretchBench, fit: Fit, found: list[_Found], added: int) -> list[MissingEffect]:
+    first = len(fit.effects) - added
+    counts = bench.counts(fit.effects)
+    out = []
+    for k, item in enumerate(found):
+        position = first + k
+        effect, begin = fit.effects[position], sum(counts[:position])
+        own = range(begin, begin + counts[position])
+        values = [
+            MissingParameter(fit.columns[i].name, float(fit.values[i]), fit.std(i), fit.columns[i].unit) for i in own
+        ]
+        values.extend(
+            MissingParameter(
+                effect.parameter_name(shape.name), float(getattr(effect, shape.name)), 0.0,
+                effect.shape_unit(shape, bench.robot),
+            )
+            for shape in (*effect.shapes, *getattr(effect, "amounts", ()))
+        )  # fmt: skip
+        out.append(
+            MissingEffect(
+                effect=effect.name,
+                joint=effect.joint,
+                parameters=tuple(values),
+                torque_share=own_torque(bench, fit, position),
+                p_value=item.p_value,
+                alternatives=item.alternatives,
+                detail=effect,
+                values=tuple(float(fit.values[i]) for i in own),
+            )
+        )
+    return out
+
+
+def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[Push, ...]) -> list[MissingEffect]:
+    """One `external_force` per joint: how many pushes, and when the first, the last and the strongest began."""
+    out = []
+    rms = np.sqrt(np.mean(processed.tau_motor**2, axis=0))
+    for i, joint in enumerate(robot.joint_names):
+        own = [p for p in pushes if p.joint == i]
+        if not own:
+            continue
+        strongest = max(own, key=lambda p: abs(p.force))
+        stem = f"{joint}.external_force"
+        interval = processed.interval
+        out.append(
+            MissingEffect(
+                effect="external_force",
+                joint=joint,
+                parameters=(
+                    MissingParameter(f"{stem}_pushes", float(len(own)), 0.0, "-"),
+                    MissingParameter(f"{stem}_first_start", own[0].start, interval, "s"),
+                    MissingParameter(f"{stem}_last_start", own[-1].start, interval, "s"),
+                    MissingParameter(f"{stem}_strongest_start", strongest.start, interval, "s"),
+                    MissingParameter(
+                        f"{stem}_strongest",
+                        strongest.force,
+                        abs(strongest.force / strongest.z),
+                        robot.joints[i].torque_unit,
+                    ),
+                ),
+                torque_share=float(abs(strongest.force) / max(rms[i], 1e-300)),
+                p_value=_tail(min(p.z for p in own), processed.samples),
+                alternatives=(),
+                detail=make_effect("external_force", joint, start=strongest.start, stop=strongest.stop),
+            )
+        )
+    return out
+
+
+def _tail(z: float, samples: int) -> float:
+    """Probability of such a departure in so many samples if its tails are as heavy as exponential ones."""
+    return float(min(1.0, samples * np.exp(-z * np.log(2.0) / 0.6745)))
+
+
+def _verdict(missing: list[MissingEffect]) -> Verdict:
+    """`none` and `named` need a noise floor, which one stretch has not."""
+    if not missing:
+        return Verdict.CANNOT_TELL
+    return Verdict.AMBIGUOUS if any(m.alternatives for m in missing) else Verdict.NAMED_WITH_REMAINDER
+
+
+def _gap(bench: StretchBench, before: Fit, after: Fit, pushes: tuple[Push, ...]) -> Gap:
+    """Rms beyond the fast part of the residual, away from pushes."""
+    names, time = bench.robot.joint_names, bench.data.motion.time
+    keep = np.stack([~pushed(pushes, time, i, AFTER_PUSH) for i in range(len(names))], axis=1)
+    noise = np.sqrt(noise_from_curvature(full_residual(bench, after)))
+
+    def beyond(fit: Fit) -> dict[str, float]:
+        power = np.mean(np.where(keep, full_residual(bench, fit), 0.0) ** 2, axis=0) / np.maximum(
+            keep.mean(axis=0), 0.1
+        )
+        rms: FloatArray = np.sqrt(np.maximum(power - noise**2, 0.0))
+        return {name: float(value) for name, value in zip(names, rms, strict=True)}
+
+    return Gap(beyond(before), beyond(after), {name: float(v) for name, v in zip(names, noise, strict=True)})
+
+
+def _text(
+    joints: tuple[str, ...],
+    verdict: Verdict,
+    missing: list[MissingEffect],
+    gap: Gap,
+    pushes: tuple[Push, ...],
+    found: list[_Found],
+) -> str:
+    parts = ["There is no mean over periods to judge the residual by, so these are hints and not names."]
+    if not missing:
+        parts.append(
+            "No effect of the library predicts blocks of the recording better from the other blocks. That does not "
+            "say that nothing is missing."
+        )
+    for m in missing:
+        if m.effect == "external_force":
+            own = [p for p in pushes if joints[p.joint] == m.joint]
+            times = ", ".join(f"{p.start:.3f}" for p in own[:6])
+            more = f" and {len(own) - 6} more" if len(own) > 6 else ""
+            parts.append(
+                f"Something that does not belong to the model pushes {len(own)} time(s) at {m.joint} (external_force), "
+                f"beginning at {times} s{more}; these parts were left out."
+            )
+            continue
+        item = next(f for f in found if f.effect.name == m.effect and f.effect.joint == m.joint)
+        others = "".join(f" or {a.effect} at {a.joint}" for a in m.alternatives)
+        parts.append(
+            f"The data speak for {m.effect} at {m.joint}{others} ({100 * m.torque_share:.2g} % of torque): with it "
+            f"{item.better} of {BLOCKS} blocks are predicted better, {100 * item.gain:.0f} % less squared error."
+        )
+    parts.extend(
+        f"{joint}: {gap.after[joint]:.3g} (rms) is left beyond a fast part of {gap.noise[joint]:.2g}; slow noise and "
+        "missing effects cannot be told apart in it."
+        for joint in joints
     )
+    return " ".join(parts)

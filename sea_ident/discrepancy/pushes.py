@@ -1,0 +1,145 @@
+"""Pushes from outside in a recording: what happens once, where everything that a model lacks happens in every pass."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, uniform_filter1d
+
+from sea_ident._typing import FloatArray
+
+WINDOW = 0.005
+"""A push is looked for in means over this time [s]."""
+
+SIGNIFICANT = 10.0
+"""Robust standard deviations that the mean over a window must be away from the usual."""
+
+LAST_SHARE = 0.2
+"""A push lasts while the residual is beyond this share of the threshold ..."""
+
+APART = 0.1
+"""... and with gaps of no more than this within [s]."""
+
+FEWEST_PASSES = 3
+"""Passes of the same motion from which on what repeats is told from what does not."""
+
+REVERSAL = 0.05
+"""Time around a reversal in which no push is looked for where nothing repeats [s]."""
+
+LONGEST = 0.25
+"""Share of the recording that pushes at a joint may take; beyond it the residual is no push but a poor model."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """A push at a joint.
+
+    Attributes:
+        joint: index of the joint.
+        start: [s].
+        stop: [s].
+        force: largest mean over a window, with its sign [N m] or [N].
+        impulse: integral over the push [N m s] or [N s].
+        z: the force in robust standard deviations of the residual elsewhere.
+    """
+
+    joint: int
+    start: float
+    stop: float
+    force: float
+    impulse: float
+    z: float
+
+
+def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_samples: int = 0) -> tuple[Push, ...]:
+    """Find where a residual departs for a short time from what it is otherwise.
+
+    Where the motion repeats itself, the median over the passes is taken off first: friction at reversals and whatever
+    else the model lacks comes again in every pass, a push does not. Where it does not repeat itself, the time around
+    reversals is left aside instead.
+
+    Args:
+        time: (N,) evenly spaced [s].
+        residual: (N, n) measured less modelled torque.
+        speed: (N, n) of the joints.
+        pass_samples: samples of one pass of a motion that repeats itself, 0 where it does not.
+
+    Returns:
+        Pushes in the order of time.
+    """
+    interval = float(time[1] - time[0])
+    window = max(1, round(WINDOW / interval))
+    repeats = pass_samples > 0 and len(time) >= FEWEST_PASSES * pass_samples
+    own = residual - repeated(residual, pass_samples) if repeats else residual
+    found: list[Push] = []
+    for i in range(residual.shape[1]):
+        smooth = uniform_filter1d(own[:, i], window)
+        usable = np.ones(len(time), dtype=np.bool_)
+        if not repeats:
+            usable = ~_near_reversal(speed[:, i], round(REVERSAL / interval))
+            # slow misfit is not a push
+            smooth = smooth - uniform_filter1d(smooth, max(window, round(0.5 / interval)))
+        found.extend(_runs(i, time, own[:, i], smooth, usable))
+    return tuple(sorted(found, key=lambda p: p.start))
+
+
+def repeated(values: FloatArray, pass_samples: int) -> FloatArray:
+    """(N, n) median over all passes at the same phase."""
+    count = len(values)
+    passes = -(-count // pass_samples)
+    padded = np.full((passes * pass_samples, values.shape[1]), np.nan)
+    padded[:count] = values
+    middle = np.nanmedian(padded.reshape(passes, pass_samples, -1), axis=0)
+    out: FloatArray = np.tile(middle, (passes, 1))[:count]
+    return out
+
+
+def pushed(pushes: tuple[Push, ...], time: FloatArray, joint: int, margin: float) -> NDArray[np.bool_]:
+    """(N,) whether a joint is pushed, or was within `margin` [s]."""
+    out = np.zeros(len(time), dtype=np.bool_)
+    for push in pushes:
+        if push.joint == joint:
+            out |= (time >= push.start - margin) & (time <= push.stop + margin)
+    return out
+
+
+def _near_reversal(speed: FloatArray, reach: int) -> NDArray[np.bool_]:
+    slow = np.abs(speed) < 0.02 * float(np.sqrt(np.mean(speed**2)))
+    crossing = np.sign(speed) != np.sign(np.roll(speed, 1))
+    return np.asarray(binary_dilation(slow | crossing, iterations=max(reach, 1)), dtype=np.bool_)
+
+
+def _runs(joint: int, time: FloatArray, own: FloatArray, smooth: FloatArray, usable: NDArray[np.bool_]) -> list[Push]:
+    interval = float(time[1] - time[0])
+    if np.count_nonzero(usable) < 16:
+        return []
+    spread = float(np.median(np.abs(smooth[usable])) / 0.6745)
+    if spread <= 0.0:
+        return []
+    high = usable & (np.abs(smooth) > SIGNIFICANT * spread)
+    if not np.any(high):
+        return []
+    gap = max(1, round(APART / interval / 2.0))
+    low = usable & (np.abs(smooth) > LAST_SHARE * SIGNIFICANT * spread)
+    near = binary_dilation(high, iterations=gap)
+    joined = binary_dilation(low & near, iterations=max(1, gap // 4))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], joined.astype(int), [0]])))
+    found = []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        inside = np.flatnonzero((low & near)[first:last]) + first
+        if not np.any(high[first:last]):
+            continue
+        peak = int(inside[np.argmax(np.abs(smooth[inside]))])
+        begin = int(first + np.argmax(high[first:last]))
+        while begin > 0 and low[begin - 1]:
+            begin -= 1
+        span = slice(begin, int(inside[-1]) + 1)
+        found.append(
+            Push(
+                joint, float(time[begin]), float(time[inside[-1]]), float(smooth[peak]),
+                float(own[span].sum() * interval), float(abs(smooth[peak]) / spread),
+            )
+        )  # fmt: skip
+    if sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
+        return []
+    return found
