@@ -84,8 +84,8 @@ def completed(bench: Bench) -> Completed | None:
         if accepted is None:
             break
         candidate, new, p_value = accepted
-        now = Settled(new, bench.noise(new), 0.0)
-        now = Settled(bench.fit(new.effects, now.noise, start=new.parameters), now.noise, 0.0)
+        now = Settled(new, bench.noise(new))
+        now = Settled(bench.fit(new.effects, now.noise, start=new.parameters), now.noise)
         p_values.append(p_value)
         names.append(f"{candidate.effect.name} at {candidate.effect.joint}")
         done = (candidate.effect.name, candidate.effect.joint)

@@ -672,42 +672,11 @@ class Bench:
         taken = solve(_off(free, whiten(whitener, fit.directions)), np.zeros(len(free)))[1]
         return noise_beside_model(residuals, plain, np.concatenate([free, taken], axis=1))
 
-    def with_remainder(self, noise: NoiseFloor, share: float) -> NoiseFloor:
-        """The noise floor raised by a share of the torque, frequency by frequency, for what a model does not have."""
-        if share == 0.0:
-            return noise.with_remainder(np.zeros_like(noise.remainder))
-        return noise.with_remainder(share**2 * self.torque_power)
-
-    @cached_property
-    def torque_power(self) -> FloatArray:
-        """(H + 1, E) power of the torque that each equation is about, per real component, smoothed over harmonics."""
-        power = np.abs(self.torque_spectrum(self.first_fit)) ** 2
-        power[1:] /= 2.0
-        half = min(4, len(power) - 1)
-        padded = np.concatenate([power[half:0:-1], power, power[-2 : -2 - half : -1]])
-        total = np.cumsum(np.concatenate([np.zeros((1, power.shape[1])), padded]), axis=0)
-        width = 2 * half + 1
-        return np.asarray((total[width:] - total[:-width]) / width, dtype=np.float64)
-
     @cached_property
     def torque_rms(self) -> FloatArray:
         """(E,) rms of the motor torque of the joint that each equation belongs to [N m]."""
         rms = np.sqrt(np.mean(self.data.tau_motor**2, axis=0))
         return np.asarray(rms[[equation.index for equation in self.data.equations]], dtype=np.float64)
-
-    def torque_spectrum(self, fit: Fit) -> ComplexArray:
-        """(H + 1, E) torque that each equation is about: of the motor, of the spring in a link equation."""
-        out = self._target.copy()
-        springs = [e for e in fit.effects if e.side is Side.SPRING]
-        counts, spring = self.counts(springs), np.zeros_like(out)
-        for effect, count in zip(springs, counts, strict=True):
-            own = np.array([fit.parameters[c.name] for c in effect.columns(self.robot)])
-            if count:
-                spring += self.column_spectra(effect, fit.effects) @ own
-        for e, equation in enumerate(self.data.equations):
-            if equation.kind is EquationKind.LINK:
-                out[:, e] = spring[:, e]
-        return out
 
 
 def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import stats
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.gap import excess_power
 from sea_ident.discrepancy.search import Settled, flat_periods
 
 FEWEST_STEPS = 4
@@ -26,9 +27,8 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
     Returns:
         Statistic, its degrees of freedom, and the probability of as much by noise.
     """
-    plain = settled.noise.with_remainder(np.zeros_like(settled.noise.remainder))
-    statistic, dof = bench.statistic(settled.fit, plain), settled.fit.dof
-    periods = flat_periods(bench, Settled(settled.fit, plain, 0.0))
+    statistic, dof = settled.fit.statistic, settled.fit.dof
+    periods = flat_periods(bench, settled)
     basis = settled.fit.basis
     periods = periods - (periods @ basis) @ basis.T
     steps = np.diff(periods, axis=0) / np.sqrt(2.0)
@@ -40,3 +40,9 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
     count = bench.data.periods
     each = 2.0 * (count - 1) ** 2 / (3.0 * count - 4.0) if count > 2 else 1.0
     return statistic, dof, float(stats.f.sf(statistic / max(dof, 1), directions, directions * each))
+
+
+def remainder_share(bench: Bench, settled: Settled) -> float:
+    """Rms of what a fit leaves beyond noise, as a share of the rms torque there: the largest of all."""
+    excess = np.sqrt(excess_power(bench, settled.fit, settled.noise))
+    return float(np.max(excess / np.maximum(bench.torque_rms, 1e-300)))

@@ -22,14 +22,12 @@ class NoiseFloor:
 
     Attributes:
         covariance: (H + 1, E, E) of each real component of the mean residual [(N m)^2].
-        remainder: (H + 1, E) variance that stands for what no model has [(N m)^2]; zero by default.
         periods: P.
         freedom: complex degrees of freedom of every covariance.
         total_freedom: real degrees of freedom of the whole estimate.
     """
 
     covariance: ComplexArray
-    remainder: FloatArray
     periods: int
     freedom: float
     total_freedom: float
@@ -47,16 +45,11 @@ class NoiseFloor:
         weight[0] = 1.0
         return np.asarray(np.sqrt(weight @ power), dtype=np.float64)
 
-    def with_remainder(self, remainder: FloatArray) -> "NoiseFloor":
-        """The same noise with a variance (H + 1, E) on top."""
-        return replace(self, remainder=remainder)
-
     def whitener(self) -> ComplexArray:
         """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
         count = self.equations
-        total = self.covariance + np.einsum("ke,ef->kef", self.remainder, np.eye(count))
-        size = np.sqrt(np.maximum(np.real(np.einsum("kee->ke", total)), 1e-300))
-        correlation = total / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(count)
+        size = np.sqrt(np.maximum(np.real(np.einsum("kee->ke", self.covariance)), 1e-300))
+        correlation = self.covariance / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(count)
         triangle = np.linalg.cholesky(correlation)
         unbiased = np.sqrt(max(self.freedom - count, 1.0) / self.freedom)
         inverse = np.linalg.solve(triangle, np.broadcast_to(np.eye(count, dtype=np.complex128), triangle.shape))
@@ -104,7 +97,6 @@ def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = No
     smooth += np.einsum("ke,ef->kef", 1e-12 * scale + 1e-300, np.eye(count))
     return NoiseFloor(
         covariance=smooth / periods,
-        remainder=np.zeros((harmonics, count)),
         periods=periods,
         freedom=each * (2 * half + 1) * left,
         total_freedom=each * 2.0 * harmonics * left,
@@ -142,7 +134,7 @@ def noise_beside_model(residuals: ComplexArray, plain: NoiseFloor, basis: FloatA
     inside = noise_from_periods(np.stack([unstacked(f, count) for f in flat]), leverage)
     colour = np.linalg.inv(whitener)
     covariance = np.matmul(np.matmul(colour, inside.covariance), colour.conj().transpose(0, 2, 1))
-    return replace(inside, covariance=covariance, remainder=plain.remainder)
+    return replace(inside, covariance=covariance)
 
 
 def _moving_mean(values: ComplexArray, half: int) -> ComplexArray:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
-from scipy.optimize import brentq
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, whiten
@@ -22,9 +21,6 @@ MOST_EFFECTS = 4
 
 USEFUL_SHARE = 0.2
 """Share of the excess that an effect must explain to be accepted."""
-
-TOLERATED = 0.0
-"""The floor is raised until the statistic is at most this many times its degrees of freedom."""
 
 SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
@@ -98,25 +94,19 @@ class Selection:
 class Settled:
     """A model fitted in a noise floor that belongs to it.
 
-    Where a model is far from the data, noise alone is no measure: a link equation has nothing on its right-hand side,
-    and its tiny noise would pull all its parameters to zero. So the floor is raised by a share of the torque until
-    the misfit is no larger than twice what the floor allows. A model that is right needs no share.
-
     Attributes:
         fit: the fit.
         noise: the floor that it was fitted in.
-        share: of the torque, by which the floor is raised [-].
     """
 
     fit: Fit
     noise: NoiseFloor
-    share: float
 
 
 def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
     """Fit a model and find its noise floor in turn, from nothing."""
     fit = bench.first_fit if tuple(effects) == bench.effects else bench.fit(effects, None, tangents=False)
-    settled = Settled(fit, bench.noise(fit), 0.0)
+    settled = Settled(fit, bench.noise(fit))
     for _ in range(rounds):
         settled = settle_again(bench, settled.fit)
     return settled
@@ -124,37 +114,15 @@ def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
 
 def settle_again(bench: Bench, fit: Fit) -> Settled:
     """Noise floor of a fit, and the fit refined in it."""
-    plain = bench.noise(fit)
-    share = needed_share(bench, fit, plain, TOLERATED) if TOLERATED else 0.0
-    noise = bench.with_remainder(plain, share)
+    noise = bench.noise(fit)
     anchored = bench.anchored(fit.effects, fit.parameters)
     bench.release(anchored)
     bent = bench.refine(anchored, noise, start=fit.parameters)
     if bent.statistic > FAR * bent.dof:
         straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
         if bent.excess > BENT * straight.excess:
-            return Settled(straight, noise, share)
-    return Settled(bent, noise, share)
-
-
-def needed_share(bench: Bench, fit: Fit, noise: NoiseFloor, ratio: float) -> float:
-    """The smallest share of the torque by which the floor must be raised so that statistic / dof is at most `ratio`.
-
-    The residual of the fit is taken as it is; fits in other floors would leave less.
-    """
-
-    def misfit(share: float) -> float:
-        floor = bench.with_remainder(noise, share)
-        return bench.statistic(fit, floor) / max(fit.dof, 1) - ratio
-
-    if misfit(0.0) <= 0.0:
-        return 0.0
-    low, high = 1e-5, 1.0
-    if misfit(low) <= 0.0:
-        return low
-    if misfit(high) > 0.0:
-        return high
-    return float(np.exp(brentq(lambda u: misfit(float(np.exp(u))), np.log(low), np.log(high), xtol=0.02)))
+            return Settled(straight, noise)
+    return Settled(bent, noise)
 
 
 def significance(gain: float, columns: int, tests: int, fit: Fit, noise: NoiseFloor) -> float:

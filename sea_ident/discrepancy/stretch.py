@@ -61,7 +61,7 @@ def _from_residual(residual: ComplexArray, taken: int) -> NoiseFloor:
     smooth = smooth / left
     scale = np.real(np.einsum("kee->ke", smooth))
     smooth += np.einsum("ke,ef->kef", 1e-12 * scale + 1e-300, np.eye(count))
-    return NoiseFloor(smooth, np.zeros((harmonics, count)), 1, width * left, 2.0 * harmonics * left)
+    return NoiseFloor(smooth, 1, width * left, 2.0 * harmonics * left)
 
 
 def stretch_data(processed: ProcessedRecording, robot: Robot, left_out: NDArray[np.bool_] | None = None) -> PeriodData:

@@ -18,6 +18,9 @@ LEVEL = 1e-3
 MOST_TRENDS = 2
 """Largest number of trends that are named."""
 
+EQUALLY_GOOD = 13.8
+"""Two trends between whose gains there is less than this (odds of a thousand) are not told apart."""
+
 FEWEST_AFTER_START = 5
 """Periods from which on the first may be left out as start-up."""
 
@@ -98,7 +101,7 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     if periods < 4:
         return TrendTest(1.0, (), False)
     residuals = bench.period_residuals(fit)
-    whitener, free = bench.whitener(noise.with_remainder(np.zeros_like(noise.remainder))), bench.free_basis(noise)
+    whitener, free = bench.whitener(noise), bench.free_basis(noise)
     # whitened for the residual of one period: its variance is that of the mean times the number of periods
     flat = np.stack([whiten(whitener, residual) for residual in residuals]) / np.sqrt(periods)
     flat = flat - (flat @ free) @ free.T
@@ -122,21 +125,14 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     left = flat
     while len(named) < MOST_TRENDS and directions:
         gains = [_gain(left, d) for d in directions]
-        best = int(np.argmax(gains))
-        p_value = max(
-            _p_value(gains[best], directions[best].basis.shape[1], tests, noise), _scatter_p(left, directions[best])
-        )
+        best, p_value = _most_likely(left, directions, gains, tests, noise)
         if p_value > LEVEL or _change(bench, left, directions[best], periods) < SMALLEST_CHANGE:
             break
         named.append((directions[best], gains[best], p_value))
         left = flat - _explained(flat, [d for d, _, _ in named])
     column_p = min((p for _, _, p in named), default=1.0)
     if not named and directions:
-        gains = [_gain(flat, d) for d in directions]
-        best = int(np.argmax(gains))
-        column_p = max(
-            _p_value(gains[best], directions[best].basis.shape[1], tests, noise), _scatter_p(flat, directions[best])
-        )
+        column_p = _most_likely(flat, directions, [_gain(flat, d) for d in directions], tests, noise)[1]
     trends = tuple(
         _trend(bench, flat, d, gain, p, directions, [o for o, _, _ in named if o is not d]) for d, gain, p in named
     )
@@ -213,6 +209,18 @@ def _gain(flat: FloatArray, direction: _Direction) -> float:
     return float(along @ along)
 
 
+def _most_likely(
+    flat: FloatArray, directions: list[_Direction], gains: list[float], tests: int, noise: NoiseFloor
+) -> tuple[int, float]:
+    """Of the trends that explain about as much as the best, the one that the scatter of the periods speaks for most."""
+    close = [k for k, gain in enumerate(gains) if gain >= max(gains) - EQUALLY_GOOD]
+    p_values = [
+        max(_p_value(gains[k], len(directions[k].used), tests, noise), _scatter_p(flat, directions[k])) for k in close
+    ]
+    best = int(np.argmin(p_values))
+    return close[best], p_values[best]
+
+
 def _explained(flat: FloatArray, directions: list[_Direction]) -> FloatArray:
     """Part of the residuals (P, M) that several trends explain together."""
     columns = [np.outer(d.profile / np.linalg.norm(d.profile), b).ravel() for d in directions for b in d.basis.T]
@@ -235,10 +243,14 @@ def _scatter_p(flat: FloatArray, direction: _Direction) -> float:
     along = flat @ direction.basis
     amount = profile @ along
     rest = along - np.outer(profile, amount)
-    freedom = len(flat) - 2
-    width = direction.basis.shape[1]
-    spread = float(np.sum(rest**2)) / max(freedom * width, 1)
-    return float(stats.f.sf(float(amount @ amount) / width / max(spread, 1e-300), width, max(freedom * width, 1)))
+    freedom, width = len(flat) - 2, direction.basis.shape[1]
+    if freedom < width:
+        return 0.0
+    # Hotelling: every combination of the columns in its own scatter, that of one says nothing about another
+    spread = rest.T @ rest / freedom
+    distance = float(amount @ np.linalg.pinv(spread, hermitian=True) @ amount)
+    ratio = distance * (freedom - width + 1) / (freedom * width)
+    return float(stats.f.sf(ratio, width, freedom - width + 1))
 
 
 def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
@@ -290,7 +302,7 @@ def _trend(
             continue  # the same without its cause: a measured temperature says more than any time
         share = float(np.sum(_explained(explained, [other]) ** 2) / np.sum(explained**2))
         lost = gain - _gain(left, other)
-        if lost < 14.0 and share > alternatives.get(key, (other.effect, 0.0))[1]:
+        if lost < EQUALLY_GOOD and share > alternatives.get(key, (other.effect, 0.0))[1]:
             alternatives[key] = (other.effect, share)
     return Trend(
         effect=direction.effect,
