@@ -27,6 +27,7 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.next_experiment import with_next_experiment
+from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
@@ -130,6 +131,9 @@ def diagnose(
     tell("writing it down", 0.95)
     diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes)
     diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
+    if diagnosis.verdict is Verdict.AMBIGUOUS:
+        tell("designing the next experiment", 0.97)
+        diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)

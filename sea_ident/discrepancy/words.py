@@ -49,12 +49,6 @@ def paragraph(facts: Facts) -> str:
             parts.append(f"On held-out data the gap shrinks by {100 * facts.held.shrink:.0f} %.")
     if facts.remainder > 0.0:
         parts.append(f"A remainder of {100 * facts.remainder:.2g} % of the torque has no name.")
-    if facts.verdict is Verdict.AMBIGUOUS:
-        pair = next(m for m in facts.missing if m.alternatives)
-        parts.append(
-            f"To tell {_name(pair)} from {pair.alternatives[0].effect} at {pair.alternatives[0].joint}, record the "
-            "motion that the next experiment proposes."
-        )
     if facts.verdict is Verdict.SUSPECT:
         parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
     return " ".join(parts)

@@ -1,0 +1,265 @@
+"""The next experiment: the motion that tells apart two effects that this one does not.
+
+What tells effect A from effect B is the part of the torque of A that the model with B, its parameters and shapes
+free, cannot follow (the noncentrality of the test between them; Atkinson and Fedorov, The design of experiments for
+discriminating between two rival models, Biometrika 62, 1975). A motion is designed for that part of the columns of A;
+where that is not enough, motions for all parameters stand beside it. All are judged by that part of the whole effect
+of each in the noise of the recording, the worse of both counting.
+"""
+
+import warnings as python_warnings
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy import assess
+from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, solve, whiten
+from sea_ident.discrepancy.data import PeriodData, around_reversals
+from sea_ident.discrepancy.diagnosis import Alternative, Diagnosis, NextExperiment
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.search import Selection
+from sea_ident.effects import Effect, Side
+from sea_ident.estimation import Model
+from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.excitation import Criterion, Discrimination, DOptimality, Excitation, PredictedMotors, design_excitation
+from sea_ident.motion import FourierSeries, Motion
+from sea_ident.robot import Robot
+from sea_ident.simulation import plant_from_identified
+
+HARMONICS = 6
+"""Harmonics of a proposed motion."""
+
+STARTS = 1
+"""Random starts of a design."""
+
+SEEDS = (1, 2, 3, 4)
+"""Of the random starts."""
+
+SAMPLES_PER_HARMONIC = 5
+"""Samples of a proposed motion, per harmonic that is compared."""
+
+PLENTY = 400.0
+"""Energy, in units of the noise, beyond which no further motion is looked for."""
+
+SMALLEST_ENERGY = 10.0
+"""In units of the noise: less tells nothing apart."""
+
+WORTHWHILE = 1.1
+"""Gain below which a motion is no better than the one that was recorded."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two effects that explain a recording equally well.
+
+    Attributes:
+        own: the model with the one that was named.
+        own_position: of it among the effects.
+        rival: the model with the other.
+        rival_position: of it among the effects.
+    """
+
+    own: Fit
+    own_position: int
+    rival: Fit
+    rival_position: int
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Both, as `name at joint`."""
+        return _label(self.own.effects[self.own_position]), _label(self.rival.effects[self.rival_position])
+
+
+def ambiguous_pair(selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]) -> Pair | None:
+    """The named effect with the most similar alternative; None where all are told apart."""
+    found = [(a.cos2, position, a.fit) for position, own in alternatives.items() for a in own if a.fit is not None]
+    if not found:
+        return None
+    _, position, fit = max(found, key=lambda each: each[0])
+    return Pair(selection.final.fit, position, fit, position)
+
+
+def propose(bench: Bench, noise: NoiseFloor, pair: Pair, model: Model) -> tuple[NextExperiment | None, tuple[str, ...]]:
+    """Design the motion that tells a pair apart best, inside all limits of the robot.
+
+    Args:
+        bench: the recording that does not tell them apart.
+        noise: its noise floor.
+        pair: both.
+        model: the repaired model, for bodies and springs.
+
+    Returns:
+        The experiment, None where no better motion was found, and warnings.
+    """
+    now = separation(bench, noise, pair)
+    robot, motors = _identified(model)
+    best: tuple[float, Excitation] | None = None
+    reasons: list[str] = []
+    for excitation in _designs(robot, motors, bench, noise, pair, reasons):
+        there = separation(Bench(_data_of(bench.data, robot, excitation.series, motors), bench.effects), noise, pair)
+        if best is None or there > best[0]:
+            best = (there, excitation)
+        if there > PLENTY:
+            break
+    first, second = pair.names
+    if best is None:
+        return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
+    there, excitation = best
+    gain = float(np.sqrt(there / max(now, 1.0)))
+    if gain < WORTHWHILE or there < SMALLEST_ENERGY:
+        return None, (f"of the motions that were tried inside the limits none tells {first} from {second} better",)
+    return NextExperiment((first, second), excitation.to_dict(), gain), ()
+
+
+def separation(bench: Bench, noise: NoiseFloor, pair: Pair) -> float:
+    """Energy of one effect that the model with the other leaves, in units of the noise; the smaller of both ways."""
+    one = _left(bench, noise, pair.own, pair.own_position, pair.rival)
+    other = _left(bench, noise, pair.rival, pair.rival_position, pair.own)
+    return min(one, other)
+
+
+def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: Fit) -> float:
+    """Energy of an effect of one model outside all that another can follow."""
+    whitener, free = bench.whitener(noise), bench.free_basis(noise)
+    directions = bench.design(against.effects)
+    shapes = free_shapes(against.effects)
+    if shapes:
+        bent, _ = bench.tangents(against.effects, against.columns, against.values, shapes)
+        directions = np.concatenate([directions, bent], axis=2)
+    flat = whiten(whitener, directions)
+    flat -= free @ (free.T @ flat)
+    basis = solve(flat, np.zeros(len(flat)))[1]
+    if is_signal(truth.effects[position]):
+        others = [e for k, e in enumerate(truth.effects) if k != position]
+        with_it, without = (bench.predicted(effects, truth.parameters) for effects in (truth.effects, others))
+        torque = without.residual - with_it.residual
+    else:
+        torque = assess.contribution(bench, truth, [position])
+    signal = whiten(whitener, torque)
+    signal = signal - free @ (free.T @ signal)
+    signal = signal - basis @ (basis.T @ signal)
+    return float(signal @ signal)
+
+
+def _designs(
+    robot: Robot,
+    motors: PredictedMotors | None,
+    bench: Bench,
+    noise: NoiseFloor,
+    pair: Pair,
+    reasons: list[str],
+) -> Iterator[Excitation]:
+    """Motions designed for the columns of a pair, then motions that are wide in all.
+
+    Effects that show only beyond some border (play, the end of a range) have no slope to follow where a design starts.
+    """
+    known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
+    own, rival = pair.own.effects[pair.own_position], pair.rival.effects[pair.rival_position]
+    rows = _row_noise(bench, noise)
+    plans: list[tuple[Criterion, Sequence[Effect] | None, int]] = [(DOptimality(), None, seed) for seed in SEEDS]
+    if own.columns(robot) and rival.columns(robot):
+        plans.insert(0, (Discrimination(own, (rival,)), known, SEEDS[0]))
+    for criterion, effects, seed in plans:
+        springs = effects is not None and any(e.side is Side.SPRING for e in (*effects, own, rival))
+        try:
+            with python_warnings.catch_warnings():
+                python_warnings.simplefilter("ignore", SeaIdentWarning)
+                yield design_excitation(
+                    robot,
+                    base_frequency=1.0 / bench.data.period,
+                    harmonics=HARMONICS,
+                    starts=STARTS,
+                    seed=seed,
+                    criterion=criterion,
+                    effects=effects,
+                    motors=motors if springs else None,
+                    noise=rows if springs else None,
+                    rate=_rate(bench),
+                    jobs=1,
+                )
+        except (SeaIdentError, np.linalg.LinAlgError) as error:
+            reasons.append(str(error))
+
+
+def _rate(bench: Bench) -> float:
+    """Samples per second that are enough for a design [Hz]."""
+    return max(200.0, 25.0 * HARMONICS) / bench.data.period
+
+
+def _row_noise(bench: Bench, noise: NoiseFloor) -> FloatArray:
+    """(2 n,) noise of link rows, then of motor rows, where both are compared [N m]."""
+    n = bench.robot.n
+    out = np.full(2 * n, float(np.max(noise.std)))
+    for equation, std in zip(bench.data.equations, noise.std, strict=True):
+        if equation.kind == "link":
+            out[equation.index] = std
+        else:
+            out[n + equation.index] = std
+    return out
+
+
+def _identified(model: Model) -> tuple[Robot, PredictedMotors | None]:
+    """The robot with the bodies and the springs of a model."""
+    robot = model.robot
+    with suppress(SeaIdentError):
+        robot = plant_from_identified(model).plant.robot
+    if not model.springs:
+        return robot, None
+    laws = {spring.joint: spring.law for spring in model.springs}
+    return robot, PredictedMotors(
+        {j: law[0] for j, law in laws.items()}, {j: max(law[1], 0.0) for j, law in laws.items()}
+    )
+
+
+def _data_of(data: PeriodData, robot: Robot, series: FourierSeries, motors: PredictedMotors | None) -> PeriodData:
+    """A motion in the place of the recorded one, without torques: columns are all that is asked of it."""
+    samples = min(data.samples, SAMPLES_PER_HARMONIC * data.harmonics)
+    motion = series.sample(samples=samples)
+    if motors is not None:
+        deflection = motors.springs(robot).predict(motion)[0]
+        harmonics = min(10 * series.harmonics, (samples - 1) // 2)
+        theta = FourierSeries.fit(motion.time, motion.q + deflection, series.base_frequency, harmonics).motion(
+            motion.time
+        )
+        motion = Motion(motion.time, motion.q, motion.dq, motion.ddq, theta.q, theta.dq, theta.ddq)
+    return replace(
+        data,
+        motion=motion,
+        tau_motor=np.zeros_like(motion.q),
+        period_motions=(),
+        period_tau_motor=np.zeros((0, *motion.q.shape)),
+        channels={},
+        left_out=around_reversals(motion, data.equations),
+    )
+
+
+def _label(effect: Effect) -> str:
+    return effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
+
+
+def with_next_experiment(
+    diagnosis: Diagnosis, bench: Bench, selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]
+) -> Diagnosis:
+    """An ambiguous diagnosis with the experiment that would tell, and what to do in its text."""
+    pair = ambiguous_pair(selection, alternatives)
+    if pair is None or diagnosis.model is None:
+        return diagnosis
+    found, notes = propose(bench, selection.final.noise, pair, diagnosis.model)
+    first, second = pair.names
+    if found is None:
+        advice = (
+            f"None of the motions that were tried inside the limits of the robot tells {first} from {second}: look at "
+            "the joint itself, or change its load or its limits."
+        )
+    else:
+        advice = (
+            f"To tell {first} from {second}, record the motion of the next experiment: it shows the difference "
+            f"{found.gain:.2g} times as "
+            "clearly."
+        )
+    return replace(
+        diagnosis, next_experiment=found, text=f"{diagnosis.text} {advice}", warnings=(*diagnosis.warnings, *notes)
+    )
