@@ -29,7 +29,7 @@ class _Part(Protocol):
     def pull(self, lever: FloatArray) -> FloatArray:
         """(S, N) gradient by the state of the sum of columns times a lever (R, k, N)."""
 
-    def slopes(self, stride: int) -> FloatArray:
+    def slopes(self, stride: int, dtype: type[np.floating]) -> FloatArray:
         """(N', R, k, S) derivatives at every so many samples."""
 
 
@@ -127,15 +127,19 @@ class ColumnMotion:
             gradient += part.pull(lever[:, here])
         return gradient
 
-    def slopes(self, stride: int = 1) -> FloatArray:
-        """(N', R, p, S) derivatives at every so many samples."""
+    def slopes(self, stride: int = 1, dtype: type[np.floating] = np.float64) -> FloatArray:
+        """(N', R, p, S) derivatives at every so many samples; rows lie next to each other."""
         if len(self.parts) == 1:
-            return self.parts[0].slopes(stride)
+            return self.parts[0].slopes(stride, dtype)
         count = len(range(0, self.samples, stride))
-        slopes = np.zeros((count, self.model.rows, len(self.model.chosen), self.model.states))
+        shape = (count, self.model.states, len(self.model.chosen), self.model.rows)
+        slopes = np.zeros(shape, dtype=dtype).transpose(0, 3, 2, 1)
         for part, here in zip(self.parts, self.places, strict=True):
+            if isinstance(part, _JointPart):
+                part.put_slopes(slopes, here, stride)
+                continue
             contiguous = np.array_equal(here, np.arange(here[0], here[-1] + 1))
-            slopes[:, :, slice(here[0], here[-1] + 1) if contiguous else here] = part.slopes(stride)
+            slopes[:, :, slice(here[0], here[-1] + 1) if contiguous else here] = part.slopes(stride, dtype)
         return slopes
 
 
@@ -217,15 +221,16 @@ class _BodyPart:
             [states.T @ by_coordinate[k * nv : (k + 1) * nv] for states in self.map.states for k in range(3)]
         )
 
-    def slopes(self, stride: int) -> FloatArray:
-        slopes = _contract(self.motion.slopes(stride), self.map.fold, 1)
+    def slopes(self, stride: int, dtype: type[np.floating]) -> FloatArray:
+        slopes = _contract(self.motion.slopes(stride, dtype), self.map.fold.astype(dtype), 1)
         if self.map.groups is not None:
-            slopes = _contract(slopes, self.map.groups, 2)
+            slopes = _contract(slopes, self.map.groups.astype(dtype), 2)
         nv = len(self.map.fold)
         if len(self.map.states) == 1 and _is_identity(self.map.states[0]):
             return slopes
         return np.concatenate(
-            [slopes[..., k * nv : (k + 1) * nv] @ states for states in self.map.states for k in range(3)], axis=-1
+            [slopes[..., k * nv : (k + 1) * nv] @ states.astype(dtype) for states in self.map.states for k in range(3)],
+            axis=-1,
         )
 
 
@@ -277,13 +282,17 @@ class _JointPart:
                 gradient[place] += sign * (lever[row] * part.T).sum(axis=0)
         return gradient
 
-    def slopes(self, stride: int) -> FloatArray:
+    def slopes(self, stride: int, dtype: type[np.floating]) -> FloatArray:
         samples = len(range(0, len(self.motion), stride))
-        slopes = np.zeros((samples, self.model.rows, len(self.which), self.model.states))
+        slopes = np.zeros((samples, self.model.rows, len(self.which), self.model.states), dtype=dtype)
+        self.put_slopes(slopes, np.arange(len(self.which)), stride)
+        return slopes
+
+    def put_slopes(self, slopes: FloatArray, here: IntArray, stride: int) -> None:
+        """Add the few that are not zero to those of all columns, where its own stand at `here`."""
         for place, part in self._slopes:
             for row, sign in self._signs:
-                slopes[:, row, :, place] += sign * part[::stride]
-        return slopes
+                slopes[:, row, here, place] += sign * part[::stride]
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,8 +331,8 @@ class _OtherPart:
     def pull(self, lever: FloatArray) -> FloatArray:
         return np.asarray(np.einsum("rpn,nrps->sn", lever, self._differences, optimize=True), dtype=np.float64)
 
-    def slopes(self, stride: int) -> FloatArray:
-        return self._differences[::stride]
+    def slopes(self, stride: int, dtype: type[np.floating]) -> FloatArray:
+        return self._differences[::stride].astype(dtype)
 
 
 def _moved(motion: Motion, names: Sequence[str], joint: int, step: float) -> Motion:

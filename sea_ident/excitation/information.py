@@ -101,10 +101,12 @@ class LocalModel:
         """
         sampling = self.information.sampling
         stride = max(1, sampling.samples // (_CURVATURE_SAMPLES * sampling.harmonics))
-        slopes = self.columns.slopes(stride) * (stride * self._root)[:, None, None]
+        slopes = self.columns.slopes(stride, np.float32)
         samples, rows, p, states = slopes.shape
         k = vectors.shape[1]
-        phi = np.matmul(vectors.T, self.phi[:, :, ::stride]).transpose(2, 0, 1).astype(np.float32)
+        # the weight of the rows of the slopes goes with the smaller factor
+        phi = np.matmul(vectors.T, self.phi[:, :, ::stride]) * (stride * self._root)[:, None, None]
+        phi = np.ascontiguousarray(phi.transpose(2, 0, 1), dtype=np.float32)
         which = np.arange(0, sampling.samples, stride)
         total: SingleArray = np.zeros((1, 1), dtype=np.float32)
         size = max(1, _CHUNK // (states * p * k))

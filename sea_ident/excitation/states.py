@@ -84,10 +84,9 @@ class RigidStates:
         samples, _, k = by_state.shape
         n = self.motion.n
         width = self.sampling.bases[0].shape[1]
-        blocks = by_state.reshape(samples, 3, n * k)
-        total = np.zeros((width, n * k), dtype=by_state.dtype)
-        for order, basis in enumerate(self.sampling.bases):
-            total += np.ascontiguousarray(basis[which].T, dtype=by_state.dtype) @ blocks[:, order]
+        # all samples and orders in one product
+        bases = np.stack([basis[which] for basis in self.sampling.bases], axis=1).astype(by_state.dtype)
+        total: SingleArray = bases.reshape(samples * 3, width).T @ by_state.reshape(samples * 3, n * k)
         return total.reshape(width, n, k).transpose(1, 0, 2).reshape(n * width, k)
 
 
