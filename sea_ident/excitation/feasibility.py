@@ -1,10 +1,9 @@
-"""Whether limits can hold together, a position well inside them, and trajectories repaired into them.
+"""Whether linear limits can hold together, a position well inside them, and trajectories repaired into them.
 
 A trajectory that keeps limits which are linear in the coefficients keeps them on average, and the average is a
 constant: if any trajectory is inside, one at rest is. So their feasibility is a linear program in the n positions.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +14,9 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import InfeasibleError
 from sea_ident.excitation.linear_limits import LinearLimits
 from sea_ident.excitation.quadratic import solve_quadratic
-from sea_ident.excitation.walls import Wall
 from sea_ident.motion import FourierSeries
 
 _CUT_ROUNDS = 3
-_MOST_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,74 +109,6 @@ def inner_position(limits: LinearLimits) -> FloatArray:
     )
     position: FloatArray = np.asarray((middle if middle.status == 0 else program).x[:n], dtype=np.float64)
     return position
-
-
-def comfortable_position(
-    limits: LinearLimits,
-    walls: Sequence[Wall],
-    harmonics: int,
-    describe: Callable[[int, float], str],
-    generator: np.random.Generator,
-) -> FloatArray:
-    """A position at rest inside the linear limits and inside walls that depend on it nonlinearly.
-
-    Args:
-        limits: linear limits.
-        walls: torque and other limits.
-        harmonics: L of the trajectories that the walls take.
-        describe: says how a limit stands: from its row in all walls and the part of its range that is left.
-        generator: of random positions, tried if the middle of the limits is outside.
-
-    Returns:
-        (n,) position.
-
-    Raises:
-        InfeasibleError: no position was found that can be held.
-    """
-    middle = inner_position(limits)
-    rest = RestLimits.of(limits)
-    n = len(middle)
-    reach = limits.joint_width()
-    best, best_room, best_values = middle, -np.inf, np.zeros(0)
-    for trial in range(400):
-        position = middle
-        if trial:
-            wish = middle + 0.5 * reach * generator.uniform(-1.0, 1.0, n)
-            ahead = rest.rows @ (wish - middle)
-            free = rest.bounds - rest.rows @ middle
-            with np.errstate(divide="ignore", invalid="ignore"):
-                factor = np.where(ahead > 0.0, free / ahead, np.inf).min(initial=1.0)
-            position = middle + 0.9 * min(1.0, float(factor)) * (wish - middle)
-        room, values = _room(walls, at_rest(position, harmonics))
-        if room > best_room:
-            best, best_room, best_values = position, room, values
-        if best_room > 0.3 or (trial >= 60 and best_room > 0.05):
-            break
-    if best_room <= 1e-3:
-        tight = np.flatnonzero(best_values <= 1e-3)
-        tight = tight[np.argsort(best_values[tight], kind="stable")]
-        found = list(dict.fromkeys(describe(int(k), float(best_values[k])) for k in tight))
-        if len(found) > _MOST_NAMED:
-            found[_MOST_NAMED:] = [f"{len(found) - _MOST_NAMED} more"]
-        described = "; ".join(found)
-        raise InfeasibleError(
-            f"no position was found at which the robot can stay inside all limits. At the best of 400: {described}. "
-            f"Widen these limits"
-        )
-    return best
-
-
-def _room(walls: Sequence[Wall], rest: FloatArray) -> tuple[float, FloatArray]:
-    """Smallest distance to a wall as a part of its half range, and that of every limit."""
-    parts = [np.ones(0)]
-    for wall in walls:
-        value = wall.values(rest)[:, :1]
-        both = np.isfinite(wall.upper) & np.isfinite(wall.lower)
-        one = np.where(np.isfinite(wall.upper), np.abs(wall.upper), np.abs(wall.lower))
-        half = np.where(both, 0.5 * (wall.upper - wall.lower), one)
-        parts.append((np.minimum(value - wall.lower, wall.upper - value) / half)[:, 0])
-    room = np.concatenate(parts)
-    return float(room.min(initial=1.0)), room
 
 
 def at_rest(position: FloatArray, harmonics: int) -> FloatArray:

@@ -12,11 +12,12 @@ from sea_ident.excitation.criteria import Criterion, log_det
 from sea_ident.excitation.curvature_bounds import MotionBounds, proven_margins
 from sea_ident.excitation.design_model import DesignModel
 from sea_ident.excitation.dynamic_limits import DynamicLimits, dynamic_limits
-from sea_ident.excitation.feasibility import at_rest, comfortable_position, shrink
+from sea_ident.excitation.feasibility import at_rest, shrink
 from sea_ident.excitation.information import Information
 from sea_ident.excitation.limit_checks import as_numbers
 from sea_ident.excitation.linear_limits import LinearLimits, linear_limits
 from sea_ident.excitation.ramp import Ramp, RampMotion, design_ramp, design_ramp_out
+from sea_ident.excitation.rest_position import comfortable_position
 from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.space_limits import SpaceLimits, space_limits
 from sea_ident.excitation.space_proof import TOLERANCE, proven_rooms

@@ -400,9 +400,16 @@ def test_limits_that_cannot_be_used(changes, says):
 def test_what_nobody_can_keep_is_said_with_plane_and_numbers():
     with pytest.raises(InfeasibleError, match=r"floor \(hand\): n . p = .* m with n = \[0.0, 0.0, 1.0\], at most -3 m"):
         design(arm(), half_spaces=(half_space(normal=(0.0, 0.0, 1.0), offset=-3.0),))
-    corner = tuple(half_space(normal=sign * np.eye(3)[axis], offset=0.3) for sign in (1.0, -1.0) for axis in (0, 2))
-    with pytest.raises(InfeasibleError, match=r"base - hand.distance: 0\.\d+ m apart, at least 0.6 m"):
-        design(arm(), half_spaces=corner, self_collision=SelfCollision(0.6))
+    # the hand near the base, and far from it; the wall far away has no part in it
+    near = tuple(half_space(normal=sign * np.eye(3)[axis], offset=0.3) for sign in (1.0, -1.0) for axis in (0, 2))
+    away = half_space("lower", (1.0, 0.0, 0.0), 5.0, name="wall")
+    with pytest.raises(InfeasibleError, match=r"base - hand.distance: 0\.\d+ m apart, at least 0.6 m") as caught:
+        design(arm(), half_spaces=(*near, away), self_collision=SelfCollision(0.6))
+    text = str(caught.value)
+    assert "floor (hand)" in text
+    assert "wall" not in text
+    # what only a small part of all positions keeps is found
+    assert min(design(arm(), half_spaces=near, self_collision=SelfCollision(0.2)).margins.values()) >= 0.0
 
 
 def test_start_outside_is_moved_inside_and_the_limits_are_named():
