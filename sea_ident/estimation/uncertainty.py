@@ -20,6 +20,9 @@ FEW_PERIODS = 6
 BLOCK = 1.0
 """Length of the pieces into which few periods are cut [s]."""
 
+DRIFT = 0.95
+"""Probability with which chance keeps the difference of whole periods below what counts as drift."""
+
 MISFIT = 1.5
 """Energy of the mean residual over that of its noise from which on the model is taken to lack something."""
 
@@ -100,14 +103,15 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
     residuals = observations.period_residuals(estimate.values, estimate.period_torque)
     residuals -= residuals.mean(axis=0)
     periods = len(residuals)
+    drifted: tuple[str, ...] = ()
     influences = np.einsum("pkn,knb->pb", residuals, estimate.instruments) @ estimate.inverse.T / periods
     if periods >= FEW_PERIODS:
         covariance = influences.T @ influences * (periods / (periods - 1.0))
         kind, freedom = CovarianceKind.PERIODS, periods - 1.0
     else:
-        covariance, freedom = _from_blocks(observations, estimate, residuals)
+        covariance, freedom, drifted = _with_drift(*_from_blocks(observations, estimate, residuals), influences)
         kind = CovarianceKind.BLOCKS
-    found = _disagreement(observations, estimate, covariance)
+    found = (*drifted, *_disagreement(observations, estimate, covariance))
     misfit, text = _misfit(observations, estimate, residuals)
     if misfit is None:
         return Uncertainty(covariance, freedom, kind, influences, covariance, found)
@@ -183,6 +187,35 @@ def _from_blocks(observations: Observations, estimate: Estimate, residuals: Floa
     energy = np.einsum("pkb,pkb->kb", parts, parts)
     share = float(np.median(energy.sum(axis=0) ** 2 / np.maximum((energy**2).sum(axis=0), 1e-300)))
     return covariance, max((periods - 1.0) * share / 1.5, 1.0)
+
+
+def _with_drift(
+    covariance: FloatArray, freedom: float, influences: FloatArray
+) -> tuple[FloatArray, float, tuple[str, ...]]:
+    """Few periods that differ as a whole by more than their pieces say: what drifts counts, too.
+
+    Args:
+        covariance: (b, b) from pieces of the periods.
+        freedom: of its variances.
+        influences: (P, b) of whole periods.
+
+    Returns:
+        Covariance, degrees of freedom, and a warning where they differ more than chance would have it.
+    """
+    periods = len(influences)
+    own = np.diag(covariance)
+    if np.any(own <= 0.0):
+        return covariance, freedom, ()
+    ratio = float(np.mean((influences**2).sum(axis=0) / own)) * periods / (periods - 1.0)
+    correlation = covariance / np.sqrt(np.outer(own, own))
+    independent = (periods - 1.0) * len(own) ** 2 / float(np.sum(correlation**2))
+    if ratio <= stats.chi2.ppf(DRIFT, independent) / independent:
+        return covariance, freedom, ()
+    text = (
+        f"whole periods differ by {ratio**0.5:.2g} times what the scatter within them explains: something drifts from "
+        "period to period. Standard deviations count it; record more periods"
+    )
+    return ratio * covariance, min(freedom, independent), (text,)
 
 
 def _from_residual(observations: Observations, estimate: Estimate) -> FloatArray:

@@ -63,9 +63,7 @@ def main() -> None:
     seconds_are["designed, knowing the first"] = designed
 
     exact = dict(zip(before[0].names, before[0].base.project(truth_of(leg, first, 1000).parameters), strict=True))
-    print(
-        f"First: 20 periods, second: {arguments.periods}; {arguments.seeds} seeds; design took {seconds:.1f} s of CPU.\n"
-    )
+    print(f"First: 20 periods, second: {arguments.periods}; {arguments.seeds} seeds; design took {seconds:.1f} s.\n")
     print("Per parameter [%]: by eq. 13 / as stated (rms) / error made (rms).\n")
     print("| second recording | log det | changed | " + " | ".join(WEAK) + " |")
     print("|---|---|---|" + "---|" * len(WEAK))

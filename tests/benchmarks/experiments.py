@@ -1,8 +1,8 @@
 """Simulated experiments that many seeds can share.
 
-Closed-loop passes of the exoskeleton leg with friction jitter are simulated once, without sensor noise. A seed then
-draws passes at random and adds its own sensor noise. That is what a new experiment would give, as consecutive passes
-are independent of each other but for the state at their seam, and two hundred of them cost a few minutes, not hours.
+Closed-loop passes of the exoskeleton leg with friction jitter are simulated once, without sensor noise. Each seed takes
+its own consecutive passes and adds its own sensor noise, which is what a new experiment would give. Consecutive they
+must be: where one pass does not begin as the one before it ended, there is a jump that no machine makes.
 """
 
 import json
@@ -62,6 +62,10 @@ class Pool:
     tau_motor: np.ndarray
     loop_noise: np.ndarray | None = None
     rate: float = RATE
+
+    def experiments(self, periods: int) -> int:
+        """How many recordings of so many passes it holds."""
+        return len(self.q) // periods
 
     def thinned(self, step: int) -> "Pool":
         """Every so many samples only: as if the sensors had been read less often."""
@@ -173,9 +177,16 @@ def cached_pool(name: str, passes: int, seed: int, **settings) -> Pool:
 
 
 def draw(pool: Pool, seed: int, periods: int, sensors: Sensors) -> Recording:
-    """What the sensors see of passes drawn at random."""
+    """What the sensors see of the passes of a seed: its own where the pool has enough, else in turn those there are.
+
+    In a loop that sees noise the passes differ by no more than that noise, so that any order of them will do; each seed
+    draws its own.
+    """
     rng = np.random.default_rng(seed)
-    chosen = rng.choice(len(pool.q), periods, replace=len(pool.q) < periods)
+    if pool.loop_noise is None:
+        chosen = np.arange(periods) + seed % pool.experiments(periods) * periods
+    else:
+        chosen = rng.choice(len(pool.q), periods, replace=False)
     n = pool.robot.n
     q, theta, current = (table[chosen].reshape(-1, n) for table in (pool.q, pool.theta, pool.current))
     q = q + sensors.link * rng.standard_normal(q.shape)

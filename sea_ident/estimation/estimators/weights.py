@@ -122,7 +122,8 @@ def steady(observations: Observations) -> FloatArray:
         j = observations.robot.index(effect.required_joint)
         order = np.argsort(speed[:, j])
         bins = np.array_split(order, SPEED_BINS)
-        level = np.array([processed.raw_tau_variance[part, j].mean() for part in bins])
+        # the median, so that a spike does not make its class look like a reversal
+        level = np.array([np.median(processed.raw_tau_variance[part, j]) for part in bins])
         usual = float(np.median(level[SPEED_BINS // 2 :]))
         if usual <= 0.0:
             continue
