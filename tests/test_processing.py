@@ -140,3 +140,22 @@ def test_motor_torque_from_current_by_direction(leg, truth):
     found = process(Recording(recording.time, columns, "currents"), leg, period=10.0, motor_harmonics=60)
     moving = np.abs(truth.motion.dtheta) > 0.01
     np.testing.assert_allclose(found.tau_motor[moving], truth.tau_motor[moving], rtol=1e-6, atol=1e-6)
+
+
+def test_torques_that_never_change_are_refused(leg, truth):
+    recording = record(leg, truth, 2, torque_noise=0.1)
+    dead = recording.replace_columns({f"tau_motor_{j}": np.full(4000, 0.5) for j in leg.joint_names})
+    with pytest.raises(RecordingError, match=r"joints are constant \(tau_motor_hip, tau_motor_knee, tau_motor_ankle"):
+        process(dead, leg, period=10.0)
+
+
+def test_one_torque_that_never_changes_is_named(leg, truth):
+    recording = record(leg, truth, 2, torque_noise=0.1)
+    with pytest.warns(SeaIdentWarning, match="column tau_motor_knee is constant, 0.5: it is no measured torque"):
+        process(recording.replace_columns({"tau_motor_knee": np.full(4000, 0.5)}), leg, period=10.0)
+
+
+def test_a_motor_position_that_never_changes_is_named(leg, truth):
+    recording = record(leg, truth, 2, torque_noise=0.1)
+    with pytest.warns(SeaIdentWarning, match="theta_knee constant while q_knee moves"):
+        process(recording.replace_columns({"theta_knee": np.full(4000, 0.1)}), leg, period=10.0)

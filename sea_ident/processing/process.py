@@ -162,7 +162,17 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
                 f"{recording.source}: theta_{names[i]} and q_{names[i]} are the same numbers: without a deflection "
                 "there is no spring to be identified"
             )
+        elif np.ptp(theta[:, i]) == 0.0 < np.ptp(q[:, i]):
+            found.append(
+                f"{recording.source}: theta_{names[i]} constant while q_{names[i]} moves: is the motor measured? If it "
+                "is locked, this recording does not tell its inertia and friction"
+            )
     source = torque.torque_source(recording, robot)
+    if np.all(np.ptp(source.values, axis=0) == 0.0):
+        raise RecordingError(
+            f"{recording.source}: the motor torques of all joints are constant ({', '.join(source.columns)}): nothing "
+            "was measured that a model could explain. Are the columns the right ones?"
+        )
     found.extend(source.warnings)
     notes.extend(source.notes)
     others = {

@@ -19,12 +19,14 @@ class TorqueSource:
 
     Attributes:
         values: (M, n) torque at the joint side without losses of the transmission [N m] or [N].
+        columns: (n,) columns they come from.
         efficiency: (n,) eta where the torque comes from a current, 1 where it was measured [-].
         notes: what was used.
         warnings: saturation and the like.
     """
 
     values: FloatArray
+    columns: tuple[str, ...]
     efficiency: FloatArray
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -45,6 +47,7 @@ def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
     """
     values = np.empty((recording.samples, robot.n))
     efficiency = np.ones(robot.n)
+    columns: list[str] = []
     notes, warnings = [], []
     for i, joint in enumerate(robot.joints):
         if recording.has("tau_motor", joint.name):
@@ -69,10 +72,11 @@ def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
                 f"current_{joint.name}; without a motor torque nothing can be identified. "
                 f"There are: time, {', '.join(recording.columns)}"
             )
-        text = _saturation(values[:, i], f"{kind}_{joint.name}", recording.source)
+        columns.append(f"{kind}_{joint.name}")
+        text = _saturation(values[:, i], columns[-1], recording.source)
         if text:
             warnings.append(text)
-    return TorqueSource(values, efficiency, tuple(notes), tuple(warnings))
+    return TorqueSource(values, tuple(columns), efficiency, tuple(notes), tuple(warnings))
 
 
 def transmitted(torque: FloatArray, efficiency: FloatArray, direction: FloatArray) -> FloatArray:
