@@ -130,13 +130,17 @@ def _runs(joint: int, time: FloatArray, own: FloatArray, smooth: FloatArray, usa
         if not np.any(high[first:last]):
             continue
         peak = int(inside[np.argmax(np.abs(smooth[inside]))])
+        # from where it clearly pushes, as far as it does without a break
         begin = int(first + np.argmax(high[first:last]))
         while begin > 0 and low[begin - 1]:
             begin -= 1
-        span = slice(begin, int(inside[-1]) + 1)
+        end = int(last - 1 - np.argmax(high[first:last][::-1]))
+        while end + 1 < len(low) and low[end + 1]:
+            end += 1
+        span = slice(begin, end + 1)
         found.append(
             Push(
-                joint, float(time[begin]), float(time[inside[-1]]), float(smooth[peak]),
+                joint, float(time[begin]), float(time[end]), float(smooth[peak]),
                 float(own[span].sum() * interval), float(abs(smooth[peak]) / spread),
             )
         )  # fmt: skip
