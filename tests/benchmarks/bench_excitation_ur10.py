@@ -26,10 +26,10 @@ from sea_ident.robot import Limits, Robot, load_robot
 
 # case: friction, criterion, starts, goal (log det at least, condition number below), seconds
 CASES = {
-    "rigid, log det": (False, DOptimality(), 8, 395.0, 4.0),
-    "friction, log det": (True, DOptimality(), 14, 425.0, 3.0),
-    "rigid, condition number": (False, ConditionNumber(), 4, 15.0, 5.0),
-    "friction, condition number": (True, ConditionNumber(), 6, 50.0, 5.0),
+    "rigid, log det": (False, DOptimality(), 6, 395.0, 4.0),
+    "friction, log det": (True, DOptimality(), 8, 425.0, 3.0),
+    "rigid, condition number": (False, ConditionNumber(), 2, 15.0, 5.0),
+    "friction, condition number": (True, ConditionNumber(), 4, 50.0, 5.0),
 }
 
 
