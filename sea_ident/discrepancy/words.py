@@ -8,6 +8,9 @@ from sea_ident.discrepancy.trend import TrendTest
 
 FEW_PERIODS = 10
 
+DISAGREES = 1e-3
+"""Probability of the lack of fit by noise below which model and data are said to disagree."""
+
 
 @dataclass(frozen=True, eq=False)
 class Facts:
@@ -94,5 +97,10 @@ def _opening(facts: Facts) -> str:
             return f"Something is missing that is not in the library.{near}"
         case Verdict.ONLY_AGAINST_REFERENCE:
             return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."
+        case _ if facts.p_value < DISAGREES:
+            return (
+                f"Model and data disagree beyond the noise (p = {facts.p_value:.2g}), but {facts.periods} period(s) of "
+                "this recording do not tell by what."
+            )
         case _:
             return "This recording does not allow a conclusion."
