@@ -5,18 +5,19 @@
 Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with and without friction that
 varies from pass to pass. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
 95 % interval. For the weightings: mean squared error relative to one variance per joint, and rms of the torque error
-on a gait that was not used. Every seed has passes of its own (see experiments.py); they are simulated once, 20 minutes
-for 200 seeds, and kept. With 200 seeds a coverage is known to 1.5 %, a bias to 0.07 of the standard deviation. What it
-printed is in results/identification.md.
+on a gait that was not used. The first hundred seeds have simulated passes of their own, the others share halves of
+them (see experiments.py). With 200 seeds a coverage is known to 1.5 %, a bias to 0.07 of the standard deviation. What
+it printed is in results/identification.md.
 """
 
 import argparse
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from experiments import Found, Pool, Sensors, cached_pool, draw, each_seed
+from experiments import Pool, Sensors, cached_pool, draw, each_seed
 
 from sea_ident.base_parameters import find_base_parameters
 from sea_ident.effects import base_effects
@@ -37,7 +38,7 @@ from sea_ident.simulation import FrictionJitter
 
 PERIODS = 20
 PASSES = 2000
-"""Of one simulation; a pool of this many holds a hundred experiments."""
+"""Of the simulation: a hundred experiments."""
 
 ESTIMATORS = {
     "least squares": LeastSquares(),
@@ -134,19 +135,14 @@ def main() -> None:
         ("every pass alike", "steady", {"jitter": FrictionJitter.none()}),
     ):
         begin = time.process_time()
-        passes = PASSES if name == "jitter" else 2 * PERIODS
-        each = passes // PERIODS
-        count = -(-arguments.seeds // each) if name == "jitter" else 1
-        pools = [cached_pool(name, passes, 1 + k, **settings) for k in range(count)]
-        names = find_base_parameters(pools[0].robot, base_effects(pools[0].robot)).names
-        names = [*names, *(f"{j} {k}" for j in pools[0].robot.joint_names for k in ("K1", "K3", "D"))]
+        pool = cached_pool(name, PASSES if name == "jitter" else 2 * PERIODS, 1, **settings)
+        names = find_base_parameters(pool.robot, base_effects(pool.robot)).names
+        names = [*names, *(f"{j} {k}" for j in pool.robot.joint_names for k in ("K1", "K3", "D"))]
 
-        def run(seed: int, pools: list[Pool] = pools, each: int = each, springs: bool = name == "jitter") -> Found:
-            return one_seed(pools[seed // each % len(pools)], seed, Sensors(), springs)
-
+        run = partial(one_seed, pool, sensors=Sensors(), springs=name == "jitter")
         results = each_seed(arguments.keep, name, range(arguments.seeds), run)
         table(title, names, results)
-        weightings(pools[0], results)
+        weightings(pool, results)
         print(f"\n  {time.process_time() - begin:.0f} s of CPU time", flush=True)
 
 

@@ -177,14 +177,16 @@ def cached_pool(name: str, passes: int, seed: int, **settings) -> Pool:
 
 
 def draw(pool: Pool, seed: int, periods: int, sensors: Sensors) -> Recording:
-    """What the sensors see of the passes of a seed: its own where the pool has enough, else in turn those there are.
+    """What the sensors see of the consecutive passes of a seed.
 
+    They are its own as long as the pool lasts; the seeds after that take the halves of two neighbours, and so on.
     In a loop that sees noise the passes differ by no more than that noise, so that any order of them will do; each seed
     draws its own.
     """
     rng = np.random.default_rng(seed)
     if pool.loop_noise is None:
-        chosen = np.arange(periods) + seed % pool.experiments(periods) * periods
+        again, block = divmod(seed, pool.experiments(periods))
+        chosen = (np.arange(periods) + block * periods + again * periods // 2) % len(pool.q)
     else:
         chosen = rng.choice(len(pool.q), periods, replace=False)
     n = pool.robot.n
