@@ -1,17 +1,52 @@
 """Diagnose, add what is missing, diagnose again, until there is nothing more to add."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.diagnose import diagnose
-from sea_ident.discrepancy.diagnosis import Diagnosis, Verdict
+from sea_ident.discrepancy.diagnosis import Diagnosis, Gap, Verdict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
+from sea_ident.simulation import Controller
 
 NAMED = (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER)
 """Verdicts after which the named effects are added and the recording is diagnosed again."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One diagnosis in numbers; gaps are rms beyond the noise over all joints, before and after what it added.
+
+    Attributes:
+        verdict: its verdict.
+        named: effect and joint of what it named.
+        torque: on the recording [N m]; None where it was not compared.
+        torque_held_out: on data that were held out [N m]; None without these.
+        simulation: of forward simulation by signal [rad] or [N m]; empty where nothing was added.
+    """
+
+    verdict: Verdict
+    named: tuple[tuple[str, str | None], ...]
+    torque: tuple[float, float] | None
+    torque_held_out: tuple[float, float] | None
+    simulation: Mapping[str, tuple[float, float] | None]
+
+    def summary(self) -> str:
+        """One line."""
+        parts = {"torque": self.torque, "torque, held out": self.torque_held_out}
+        parts |= {f"simulated {kind}": sizes for kind, sizes in self.simulation.items()}
+        found = [f"{label} {sizes[0]:.3g} -> {sizes[1]:.3g}" for label, sizes in parts.items() if sizes is not None]
+        return "gap: " + ("; ".join(found) if found else "not compared")
+
+
+def _sizes(gap: Gap | None) -> tuple[float, float] | None:
+    """Before and after over all joints."""
+    if gap is None:
+        return None
+    before, after = (sum(value**2 for value in part.values()) ** 0.5 for part in (gap.before, gap.after))
+    return float(before), float(after)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +74,26 @@ class ClosedGap:
         pairs = [(m.effect, m.joint) for d in self.rounds if d.verdict in NAMED for m in d.missing]
         return tuple(dict.fromkeys(pairs))
 
+    @property
+    def history(self) -> tuple[Round, ...]:
+        """What every round found, and how large the gap was before and after it."""
+        return tuple(
+            Round(
+                verdict=d.verdict,
+                named=tuple((m.effect, m.joint) for m in d.missing),
+                torque=_sizes(d.training),
+                torque_held_out=_sizes(d.holdout),
+                simulation={kind: _sizes(gap) for kind, gap in d.simulation_gap.items()},
+            )
+            for d in self.rounds
+        )
+
     def summary(self) -> str:
         """One paragraph per round."""
         lines = [f"{len(self.rounds)} round(s), then {self.verdict}"]
-        lines.extend(f"  {k}. {diagnosis.verdict}: {diagnosis.text}" for k, diagnosis in enumerate(self.rounds, 1))
+        for k, (diagnosis, entry) in enumerate(zip(self.rounds, self.history, strict=True), 1):
+            lines.append(f"  {k}. {diagnosis.verdict}: {diagnosis.text}")
+            lines.append(f"     {entry.summary()}")
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
 
@@ -55,11 +106,13 @@ def close_gap(
     reference: Model | None = None,
     period: float | None = None,
     rounds: int = 4,
+    controller: Controller | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> ClosedGap:
     """Add the missing effects to a model, one diagnosis after the other.
 
-    Stops when a diagnosis names nothing, or nothing that the model does not already hold, and after `rounds`.
+    Stops when a diagnosis names nothing (nothing is missing, not in the library, ambiguous, suspect), nothing that the
+    model does not hold already, or nothing that a model can hold (what drifts), and after `rounds`.
 
     Args:
         model: the model.
@@ -68,6 +121,7 @@ def close_gap(
         reference: an earlier model of the same robot.
         period: [s]; found from the data by default.
         rounds: largest number of diagnoses.
+        controller: what drove the motors, as `diagnose` takes it.
         progress: called with what is being done and the share that is done.
 
     Returns:
@@ -84,18 +138,20 @@ def close_gap(
     notes: list[str] = []
     for number in range(rounds):
         tell = None if progress is None else _share(progress, number, rounds)
-        diagnosis = diagnose(model, recording, holdout=holdout, reference=reference, period=period, progress=tell)
+        diagnosis = diagnose(
+            model, recording, holdout=holdout, reference=reference, period=period, controller=controller, progress=tell
+        )
         history.append(diagnosis)
         notes.extend(text for text in diagnosis.warnings if text not in notes)
         found = {(m.effect, m.joint) for m in diagnosis.missing}
         if diagnosis.verdict not in NAMED or diagnosis.model is None or found <= known:
             break
         known |= found
-        kept = {(effect.name, effect.joint) for effect in diagnosis.model.effects}
         model = diagnosis.model
+        kept = {(effect.name, effect.joint) for effect in (*model.effects, *model.spring_effects)}
         if not found & kept:
-            names = ", ".join(sorted(f"{effect} at {joint}" for effect, joint in found))
-            notes.append(f"{names}: named, but it cancels in the motor torque, which is all that the model predicts")
+            names = ", ".join(sorted(effect if joint is None else f"{effect} at {joint}" for effect, joint in found))
+            notes.append(f"{names}: named, but a model of one moment has no place for what changes in the recording")
             break
     else:
         notes.append(f"stopped after {rounds} diagnoses; the last one still named something")
