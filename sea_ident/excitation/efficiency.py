@@ -6,7 +6,13 @@ chosen apart. But along a periodic motion the mean of every total time derivativ
 
     mean of dh/dq q' + dh/dq' q'' = 0      for every function h(q, q'),
 
-and a motion of L harmonics has ``mean q''^2 <= (L w)^2 mean q'^2``. Both are linear in the measure. With d the
+and a motion of L harmonics has ``mean q''^2 <= (L w)^2 mean q'^2``. Both are linear in the measure. Nor does such a
+motion reach all of the box: where |q'| <= V and |q - middle| <= R at all times, Bernstein's inequality in the form of
+van der Corput and Schaake gives at every time
+
+    q''^2 + (L w)^2 q'^2 <= (L w V)^2    and    q'^2 + (L w)^2 (q - middle)^2 <= (L w R)^2.
+
+With d the
 quadratic form of the columns in a matrix W, and multipliers u, v >= 0 of these conditions,
 
     log det M <= p log(top / p) - log det W,    top = max over s of d(s) + u psi(s) + v chi(s).
@@ -14,6 +20,7 @@ quadratic form of the columns in a matrix W, and multipliers u, v >= 0 of these 
 The maximum over s is searched from many states; it is not a proof of the largest value, and the result says so.
 
 References:
+    van der Corput, Schaake, Ungleichungen fuer Polynome und trigonometrische Polynome, Compositio Mathematica, 1935.
     Kiefer, Wolfowitz, The equivalence of two extremum problems, Canadian J. Mathematics, 1960.
     Lasserre, Henrion, Prieur, Trelat, Nonlinear optimal control via occupation measures and LMI relaxations, SIAM J.
     Control and Optimization, 2008.
@@ -93,6 +100,15 @@ class _States:
         value = q @ self.combined.T
         within: NDArray[np.bool_] = np.all((value >= self.lower) & (value <= self.upper), axis=1)
         return within
+
+    def reached(self, x: FloatArray) -> FloatArray:
+        """States (K, 3 n), in units of the box, with velocities and accelerations cut to what can be had there."""
+        n = self.n
+        span, speed, rate = self.half[:n], self.half[n : 2 * n], self.half[2 * n :]
+        fastest = np.minimum(1.0, self.omega * span / speed * np.sqrt(np.maximum(1.0 - x[:, :n] ** 2, 0.0)))
+        velocity = np.clip(x[:, n : 2 * n], -fastest, fastest)
+        most = np.minimum(1.0, self.omega * speed / rate * np.sqrt(np.maximum(1.0 - velocity**2, 0.0)))
+        return np.hstack([x[:, :n], velocity, np.clip(x[:, 2 * n :], -most, most)])
 
     def rows(self, x: FloatArray) -> FloatArray:
         """(K, R, p) columns."""
@@ -186,7 +202,7 @@ def _random(box: _States, count: int, generator: np.random.Generator) -> FloatAr
         x = generator.uniform(-1.0, 1.0, (2 * count, 3 * box.n))
         corner = generator.random(x.shape) < 0.5
         x = np.where(corner, np.sign(x), x)
-        kept.append(x[box.inside(x)])
+        kept.append(box.reached(x[box.inside(x)]))
     return np.concatenate(kept)[:count]
 
 
@@ -291,6 +307,7 @@ def _climb(box: _States, dual: _Dual, scale: FloatArray, x: FloatArray) -> Float
                     trial[:, j] = -1.0 if move == "low" else 1.0
                 else:
                     trial[:, j] = np.clip(trial[:, j] + float(move), -1.0, 1.0)
+                trial = box.reached(trial)
                 found = dual.values(box.rows(trial) * scale, box.conditions(trial))
                 better = (found > value) & box.inside(trial)
                 x[better], value[better] = trial[better], found[better]

@@ -36,6 +36,29 @@ def test_conditions_hold_along_every_periodic_motion(robot_of):
         assert np.all(mean[-3:] > 0.0)
 
 
+def test_no_motion_in_the_box_leaves_the_states_that_can_be_reached(robot_of):
+    """Random motions, scaled until they touch a limit of the box: nothing of them is cut."""
+    robot = robot_of("exo_leg")
+    box = _States(robot, (make_effect("rigid_bodies"),), 0.1, 4)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        order = np.arange(1, 5) if rng.random() < 0.5 else np.array([1, 8, 27, 64])
+        waves = rng.normal(size=(2, 3, 4)) * order
+        series = FourierSeries(0.1, np.zeros(3), *waves)
+        motion = series.sample(samples=2000)
+        # every joint touches one of its own limits of position, velocity or acceleration
+        low, high = motion.q.min(axis=0), motion.q.max(axis=0)
+        sizes = [0.5 * (high - low), np.abs(motion.dq).max(axis=0), np.abs(motion.ddq).max(axis=0)]
+        factor = np.min([half / size for half, size in zip(box.half.reshape(3, 3), sizes, strict=True)], axis=0)
+        q = box.middle[:3] + factor * (motion.q - 0.5 * (low + high))
+        x = (np.hstack([q, factor * motion.dq, factor * motion.ddq]) - box.middle) / box.half
+        # squared, as the inequalities are: near its turning point a speed hangs on the last digits of the position
+        np.testing.assert_allclose(box.reached(x) ** 2, x**2, atol=1e-3)
+    corner = box.reached(np.ones((1, 9)))[0]
+    np.testing.assert_array_equal(corner[3:6], 0.0)
+    assert np.all(corner[6:] > 0.0)
+
+
 def test_no_design_exceeds_the_bound(emps):
     robot, designs = emps
     bound = bound_log_det(robot, designs[0], states=300)
