@@ -46,6 +46,9 @@ MOST_FIT_STEPS = 10
 RANK_TOLERANCE = 1e-9
 """Singular directions of the normalised columns below this share of the largest are left out."""
 
+STANDS_STILL = 1e-3
+"""A step of the shapes that takes less than this share of the excess was the last."""
+
 RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
 
@@ -562,7 +565,7 @@ class Bench:
                 break
             gain = fit.statistic - better.statistic
             fit = better
-            if gain < 0.05 + 1e-4 * fit.excess:
+            if gain < 0.05 + STANDS_STILL * fit.excess:
                 break
         return self.fit(fit.effects, noise, start=fit.parameters)
 

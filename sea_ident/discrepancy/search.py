@@ -59,6 +59,12 @@ FINALISTS = 4
 LAST_TWO = 2
 """Of these the best are compared with the shapes of the model refined too."""
 
+LITTLE_LEFT = 0.02
+"""An effect that leaves less than this share of the excess is only compared with those that promise more than it."""
+
+RIGHT = 1.2
+"""Statistic over degrees of freedom up to which no other effect is tried in the place of one that was added."""
+
 CHALLENGERS = 3
 """Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
 
@@ -188,7 +194,10 @@ def _next(
     ]
     accepted: list[tuple[float, Fit, float]] = []
     periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
+    most = 0.0
     for candidate in of_every_kind(worth, FINALISTS):
+        if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most:
+            continue
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
@@ -202,6 +211,7 @@ def _next(
         if scatter_p(periods, fit.whitened - new.whitened) > SCATTER_LEVEL:
             continue
         accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
+        most = max(most, gain)
     if not accepted:
         return None
     accepted.sort(key=lambda item: item[0])
@@ -350,6 +360,8 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
     first = len(now.fit.effects) - added
     for position in range(first, first + added):
         fit, noise = now.fit, now.noise
+        if fit.statistic < RIGHT * fit.dof:
+            break
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         own = effect_key(fit.effects[position])
