@@ -10,6 +10,7 @@ from sea_ident.estimation import (
     InstrumentalVariables,
     JointWLS,
     LeastSquares,
+    MaximumLikelihood,
     PerSampleWLS,
     Robust,
     identify,
@@ -18,7 +19,8 @@ from sea_ident.estimation import (
 )
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.processing import process
-from sea_ident.recordings import read_recording
+from sea_ident.recordings import Recording, read_recording
+from sea_ident.regressor import prior_parameters
 from sea_ident.robot import load_robot
 from sea_ident.validation import validate
 
@@ -59,7 +61,9 @@ def test_emps_period_is_found(emps_data):
 
 
 @pytest.mark.parametrize(
-    "estimator", [LeastSquares(), JointWLS(), PerSampleWLS(), Robust(), InstrumentalVariables()], ids=lambda e: e.name
+    "estimator",
+    [LeastSquares(), JointWLS(), PerSampleWLS(), Robust(), InstrumentalVariables(), MaximumLikelihood()],
+    ids=lambda e: e.name,
 )
 def test_emps_comes_out_near_the_published_values(emps, emps_model, emps_data, estimator):
     model = identify(emps, emps_data, effects=emps_model, estimator=estimator)
@@ -98,6 +102,77 @@ def test_quanser_says_what_it_does_not_know():
     assert np.all(model.uncertainty.half_width() > 2.0 * model.std)
     # the sum of link and motor rows does not separate the inertias here, and physics shows it
     assert not physical_parameters(model).consistent
+
+
+def test_quanser_repeats_after_ten_seconds_to_the_last_digit():
+    recording = read_recording(DATA / "quanser_2dof_flexible_link" / "square_wave.csv")
+    reference = np.stack([recording.columns[f"theta_reference_stage{k}"] for k in (1, 2)], axis=1)
+    interval = np.diff(recording.time).mean()
+    assert interval == pytest.approx(0.002)
+    samples = round(10.0 / interval)
+    assert np.array_equal(reference[samples:], reference[:-samples])
+    # 10.008 s, which is also told of these data, is four samples off
+    assert np.abs(reference[samples + 4 :] - reference[: -samples - 4]).max() > 0.01
+
+
+def test_quanser_beside_its_nominal_values():
+    robot = load_robot("quanser_2dof")
+    model = identify(robot, read_recording(DATA / "quanser_2dof_flexible_link" / "square_wave.csv"))
+    nominal = model.base.project(np.nan_to_num(prior_parameters(robot, model.effects)))
+    lower, upper = model.interval()
+    inside = dict(zip(model.names, (lower <= nominal) & (nominal <= upper), strict=True))
+    # the nominal model has no Coulomb friction, and more viscous friction at the second stage than these data show
+    assert not inside["stage1.coulomb_friction"]
+    assert not inside["stage2.viscous_friction"]
+    inertias = [name for name in model.names if name.split(".")[1][0] in "mIr"]
+    assert len(inertias) == 6
+    assert all(inside[name] for name in inertias)
+    # negative inertias are called impossible, with the body and the distance
+    found = physical_parameters(model)
+    assert set(found.bodies) == {"link1", "link2"}
+    assert np.abs(found.shift_in_std).max() > 2.0
+    assert "bodies that hold back: link" in found.summary()
+    possible = dict(zip(model.names, found.base_values, strict=True))
+    assert possible["link1.Izz*"] > 0.0
+    assert possible["link2.Izz"] > 0.0
+    for spring in model.springs:
+        assert spring.verdict == "not_excited"
+        assert any(f"spring of {spring.joint}" in text for text in model.warnings)
+
+
+def single_periods(robot, path, model, processed):
+    """Base parameters from every period of a recording alone, otherwise processed alike."""
+    recording = read_recording(path)
+    samples, periods = processed.samples, processed.periods
+    values = []
+    for p in range(periods):
+        first = recording.samples - (periods - p) * samples
+        part = slice(first, first + samples)
+        columns = {name: column[part] for name, column in recording.columns.items()}
+        one = process(
+            Recording(recording.time[part], columns, f"period {p + 1}"),
+            robot,
+            period=processed.period,
+            link_harmonics=processed.link_harmonics,
+            motor_harmonics=processed.motor_harmonics,
+        )
+        values.append(identify(robot, one, effects=model.effects, estimator=PerSampleWLS()).values)
+    return np.array(values)
+
+
+@pytest.mark.parametrize("name", ["emps", "quanser_2dof"])
+def test_stated_repeatability_is_the_scatter_between_real_periods(name, emps_model):
+    path = {"emps": "emps/identification.csv", "quanser_2dof": "quanser_2dof_flexible_link/square_wave.csv"}[name]
+    robot = load_robot(name)
+    processed = process(read_recording(DATA / path), robot)
+    model = identify(robot, processed, effects=emps_model if name == "emps" else None)
+    values = single_periods(robot, DATA / path, model, processed)
+    scatter = values.std(axis=0, ddof=1) / np.sqrt(len(values))
+    stated = np.sqrt(np.diag(model.uncertainty.repeatability))
+    # few periods: the scatter itself is known to a factor of about two
+    assert 0.5 < np.sqrt(np.mean((scatter / stated) ** 2)) < 2.0
+    # what the model lacks counts, too: what is stated in all is never less than the scatter
+    assert np.all(model.std > scatter)
 
 
 def test_hebi_names_the_missing_torque_constant():
