@@ -19,7 +19,7 @@ import trimesh
 import yourdfpy
 from numpy.typing import NDArray
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.chain import Chain, Poses
 from sea_ident.robot import Robot, mesh_locator
@@ -55,6 +55,12 @@ class Shape:
     def radius(self) -> float:
         """Of a ball about the centre that holds it [m]."""
         return float(np.linalg.norm(self.vertices - self.centre, axis=1).max()) + self.ball
+
+    @cached_property
+    def half(self) -> FloatArray:
+        """(3,) half the sides of the box around it, in the frame of its body [m]."""
+        sides: FloatArray = 0.5 * (self.vertices.max(axis=0) - self.vertices.min(axis=0)) + self.ball
+        return sides
 
     @cached_property
     def reach(self) -> float:
@@ -108,7 +114,7 @@ def collision_shapes(robot: Robot) -> tuple[Shape, ...]:
             origin = np.eye(4) if collision.origin is None else np.asarray(collision.origin)
             vertices = vertices @ origin[:3, :3].T + origin[:3, 3]
             placed = vertices @ frame.placement.rotation.T + frame.placement.translation
-            shapes.append(Shape(str(link.name), int(frame.parentJoint), placed, ball))
+            shapes.append(_usable(Shape(str(link.name), int(frame.parentJoint), placed, ball)))
     if not shapes:
         raise ExcitationError(f"{robot.source}: no link has a <collision>; add them, or leave self-collision out")
     return tuple(shapes)
@@ -139,6 +145,17 @@ def _outline(geometry: Any, locate: Callable[[str], Path | None], where: str) ->
     except Exception as error:  # the readers of trimesh raise whatever they do
         raise ExcitationError(f"{where}: {path} cannot be read: {error}") from None
     return _hull(_checked(vertices * (1.0 if scale is None else np.asarray(scale)), f"{where}: {path}")), 0.0
+
+
+def _usable(shape: Shape) -> Shape:
+    """The shape; in a box around it where coal cannot hold its hull (a corner with hundreds of neighbours)."""
+    try:
+        _ = shape.geometry
+    except RuntimeError:
+        back, size = trimesh.bounds.oriented_bounds(shape.vertices)  # type: ignore[no-untyped-call]
+        box = trimesh.creation.box(extents=size, transform=np.linalg.inv(back))
+        return replace(shape, vertices=np.asarray(box.vertices, dtype=np.float64))
+    return shape
 
 
 def _checked(vertices: FloatArray, where: str) -> FloatArray:
@@ -255,13 +272,30 @@ def _say(what: str, pairs: Iterable[frozenset[str]], notes: list[str]) -> None:
         notes.append(f"{what}: {', '.join(listed)}")
 
 
+def _at_least(shapes: Sequence[Shape], first: IntArray, second: IntArray, poses: Poses) -> FloatArray:
+    """(r, M) lower bounds of distances: gaps between balls, and between boxes along the line of their centres."""
+    bodies = np.array([shape.body for shape in shapes])
+    centres = np.array([poses.points(shape.body, shape.centre) for shape in shapes])
+    radius = np.array([shape.radius for shape in shapes])
+    halves = np.array([shape.half for shape in shapes])
+    between = centres[second] - centres[first]
+    length = np.linalg.norm(between, axis=2)
+    along = between / np.maximum(length, 1e-12)[:, :, None]
+    widths = np.zeros((2, *length.shape))
+    for width, side in zip(widths, (first, second), strict=True):
+        local = np.einsum("pmij,pmi->pmj", poses.rotations[bodies[side]], along)
+        width[:] = np.minimum(np.einsum("pmj,pj->pm", np.abs(local), halves[side]), radius[side][:, None])
+    bound: FloatArray = length - widths[0] - widths[1]
+    return bound
+
+
 def separations(
     shapes: Sequence[Shape],
     pairs: Sequence[Pair],
     poses: Poses,
     most: float,
     wanted: FloatArray | None = None,
-) -> tuple[FloatArray, dict[tuple[int, int], tuple[FloatArray, FloatArray]]]:
+) -> tuple[FloatArray, dict[tuple[int, int], FloatArray]]:
     """Distances between shapes.
 
     Args:
@@ -272,19 +306,16 @@ def separations(
         wanted: (M, r) which are asked for; the others are given as `most`.
 
     Returns:
-        (M, r) distances, 0 in contact, at most `most` [m], and the nearest points (3,) in the frame of the root of
-        those that are less, by sample and pair.
+        (M, r) distances, below 0 how deep shapes overlap, at most `most` [m], and, by sample and pair of those that
+        are less, the nearest points (3,) in the frame of the root and the direction (3,) from the first to the second.
     """
     samples = poses.positions.shape[1]
     found = np.full((samples, len(pairs)), most)
-    centres = np.array([poses.points(shape.body, shape.centre) for shape in shapes])
     first, second = (np.array([getattr(p, side) for p in pairs], dtype=np.intp) for side in ("first", "second"))
-    radius = np.array([shape.radius for shape in shapes])
-    apart = np.linalg.norm(centres[first] - centres[second], axis=2) - (radius[first] + radius[second])[:, None]
+    apart = _at_least(shapes, first, second, poses)
     near = (apart < most).T & (np.ones_like(found, dtype=bool) if wanted is None else wanted.astype(bool))
     request, result = coal.DistanceRequest(), coal.DistanceResult()
-    request.enable_signed_distance = False
-    points = {}
+    points: dict[tuple[int, int], FloatArray] = {}
     for m in np.flatnonzero(near.any(axis=1)):
         placed: dict[int, Any] = {}
         for k in np.flatnonzero(near[m]):
@@ -298,6 +329,7 @@ def separations(
             result.clear()
             distance = coal.distance(shapes[a].geometry, placed[a], shapes[b].geometry, placed[b], request, result)
             if distance < most:
-                found[m, k] = max(distance, 0.0)
-                points[int(m), int(k)] = (result.getNearestPoint1(), result.getNearestPoint2())
+                found[m, k] = distance
+                nearest = np.array([result.getNearestPoint1(), result.getNearestPoint2(), result.normal])
+                points[int(m), int(k)] = nearest
     return found, points

@@ -123,7 +123,7 @@ class SpaceLimits:
         q: FloatArray,
         apart: FloatArray,
         rooms: FloatArray,
-        nearest: dict[tuple[int, int], tuple[FloatArray, FloatArray]],
+        nearest: dict[tuple[int, int], FloatArray],
         by_tree: FloatArray,
     ) -> None:
         """Write the derivatives of the rooms of links into (M, r, J + 1)."""
@@ -133,10 +133,7 @@ class SpaceLimits:
             rows = [m for m in range(len(q)) if (m, k) in nearest and apart[m, k] <= rooms[m, limit]]
             if not rows:
                 continue
-            first, second = (np.array([nearest[m, k][side] for m in rows]) for side in range(2))
-            between = second - first
-            length = np.linalg.norm(between, axis=1)
-            direction = between / np.maximum(length, 1e-12)[:, None]
+            first, second, direction = np.nan_to_num([nearest[m, k] for m in rows]).swapaxes(0, 1)
             there = type(poses)(poses.rotations[:, rows], poses.positions[:, rows], poses.axes[:, rows])
             one = self.chain.slopes(there, self.shapes[pair.first].body, first, direction)
             other = self.chain.slopes(there, self.shapes[pair.second].body, second, direction)
@@ -176,7 +173,7 @@ class SpaceLimits:
             along = plane.offset - room
             return f"{self.names[limit]}: n . p = {along:.4g} m with n = {normal}, at most {plane.offset:.4g} m"
         least = float(self.least[limit])
-        return f"{self.names[limit]}: {max(room + least, 0.0):.4g} m apart, at least {least:.4g} m"
+        return f"{self.names[limit]}: {room + least:.4g} m apart, at least {least:.4g} m"
 
 
 def space_limits(robot: Robot, limits: Limits, notes: list[str]) -> SpaceLimits:

@@ -40,17 +40,23 @@ class SpaceWall:
         spent = TOLERANCE * self.limits.size / self.limits.reach
         return np.full((len(self.limits), 1), 1.0 - spent)
 
+    def _positions(self, coefficients: FloatArray) -> FloatArray:
+        """(M, n); (1, n) at rest, where all times are the same."""
+        basis = self.basis if np.any(coefficients[:, :-1]) else self.basis[:1]
+        positions: FloatArray = basis @ coefficients.T
+        return positions
+
     def values(self, coefficients: FloatArray) -> FloatArray:
         """(r, M)."""
-        basis = self.basis if np.any(coefficients[:, :-1]) else self.basis[:1]  # at rest every time is the same
-        rooms = self.limits.rooms(basis @ coefficients.T)
+        rooms = self.limits.rooms(self._positions(coefficients))
         values: FloatArray = 1.0 - rooms.T / self.limits.reach
         return np.broadcast_to(values, (len(self.limits), len(self.basis)))
 
     def tangent(self, coefficients: FloatArray) -> DynamicTangent:
         """Slopes of all rooms by all coefficients."""
-        slopes = self.limits.slopes(self.basis @ coefficients.T) / -self.limits.reach
-        samples, r, _ = slopes.shape
+        slopes = self.limits.slopes(self._positions(coefficients)) / -self.limits.reach
+        samples, r = len(self.basis), len(self.limits)
+        slopes = np.broadcast_to(slopes, (samples, *slopes.shape[1:]))
         rows = np.einsum("mrn,mw->rmnw", slopes, self.basis, optimize=True)
         return DynamicTangent(np.ascontiguousarray(rows.reshape(r, samples, -1)))
 
