@@ -9,6 +9,7 @@ from scipy import stats
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.diagnosis import Alternative, Detectability
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.search import (
@@ -74,6 +75,25 @@ def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArr
         if len(own):
             total += bench.column_spectra(effect, fit.effects) @ own
     return total
+
+
+def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
+    """(N, E) standard deviation of the torque of an effect over a period, from that of its parameters and shapes."""
+    effect, count = fit.effects[position], len(fit.columns)
+    start = sum(bench.counts(fit.effects)[:position])
+    width = len(effect.columns(bench.robot))
+    directions, factors = [], []
+    if width:
+        directions.append(bench.column_spectra(effect, fit.effects))
+        factors.append(fit.covariance_factor[start : start + width])
+    own = [(k, pair) for k, pair in enumerate(fit.free_shapes) if pair[0] == position]
+    if own:
+        directions.append(bench.tangents(fit.effects, fit.columns, fit.values, [pair for _, pair in own])[0])
+        factors.append(fit.covariance_factor[[count + k for k, _ in own]])
+    if not directions:
+        return np.zeros((bench.data.samples, len(bench.data.equations)))
+    rows = waveform(np.concatenate(directions, axis=2), bench.data.samples)
+    return np.asarray(np.linalg.norm(rows @ np.concatenate(factors), axis=2), dtype=np.float64)
 
 
 @dataclass(frozen=True)

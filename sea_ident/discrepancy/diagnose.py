@@ -27,7 +27,6 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.next_experiment import with_next_experiment
-from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
@@ -134,9 +133,6 @@ def diagnose(
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
-    if diagnosis.verdict is Verdict.AMBIGUOUS:
-        tell("designing the next experiment", 0.97)
-        diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
     tell("done", 1.0)
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
@@ -211,6 +207,7 @@ def _conclude(
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
+        other_motion=held is not None and held.other_motion,
     )  # fmt: skip
     return Diagnosis(
         verdict=verdict,
@@ -349,11 +346,13 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
     data = bench.data
     labels = tuple(f"{eq.joint} {eq.kind}" for eq in data.equations)
     explained: dict[str, FloatArray] = {}
+    bands: dict[str, FloatArray] = {}
     first = len(after.effects) - selection.added
     for position in range(first, len(after.effects)):
         effect = after.effects[position]
         label = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
         explained[label] = waveform(assess.contribution(bench, after, [position]), data.samples)
+        bands[label] = assess.torque_std(bench, after, position)
     return Waveforms(
         time=data.motion.time - data.motion.time[0],
         equations=labels,
@@ -364,6 +363,7 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
         dtheta=data.motion.dtheta,
         deflection=data.motion.deflection,
         explained=explained,
+        bands=bands,
     )
 
 

@@ -155,6 +155,16 @@ class Gap:
         before, after = (float(np.linalg.norm(list(part.values()))) for part in (self.before, self.after))
         return 1.0 - after / before if before > 0.0 else 0.0
 
+    def summary(self) -> str:
+        """Before, after and noise per joint."""
+        parts = []
+        for joint, before in self.before.items():
+            after, noise = self.after[joint], self.noise[joint]
+            change = "within the noise" if before == after == 0.0 else f"{before:.3g} -> {after:.3g}"
+            parts.append(f"{joint} {change} (noise {noise:.2g})")
+        shrink = f"; shrink {self.shrink:.2f}" if any(value > 0.0 for value in self.before.values()) else ""
+        return f"{', '.join(parts)}{shrink}"
+
 
 @dataclass(frozen=True)
 class Detectability:
@@ -206,6 +216,7 @@ class Waveforms:
         dtheta: (N, n) motor velocities [rad/s].
         deflection: (N, n) [rad].
         explained: (N, E) torque of each missing effect, by its label [N m].
+        bands: (N, E) standard deviation of that torque, from the uncertainty of parameters and shapes [N m].
     """
 
     time: FloatArray
@@ -217,6 +228,7 @@ class Waveforms:
     dtheta: FloatArray
     deflection: FloatArray
     explained: Mapping[str, FloatArray] = field(default_factory=dict)
+    bands: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,12 +279,12 @@ class Diagnosis:
             if m.alternatives:
                 others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)
                 lines.append(f"    or: {others}")
-        for label, gap in (("training", self.training), ("held out", self.holdout)):
-            if gap is not None:
-                parts = (
-                    f"{j} {gap.before[j]:.3g} -> {gap.after[j]:.3g} (noise {gap.noise[j]:.2g})" for j in gap.before
-                )
-                lines.append(f"  gap, {label}: {', '.join(parts)}; shrink {gap.shrink:.2f}")
+        gaps = {"training": self.training, "held out": self.holdout}
+        gaps |= {f"forward simulation of {kind}": gap for kind, gap in self.simulation_gap.items()}
+        lines.extend(f"  gap, {label}: {gap.summary()}" for label, gap in gaps.items() if gap is not None)
+        if self.next_experiment is not None:
+            first, second = self.next_experiment.separates
+            lines.append(f"  next experiment: tells {first} from {second} {self.next_experiment.gain:.3g} times better")
         lines.extend(
             f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.1f}" for x in self.locations[:5]
         )
@@ -386,6 +398,7 @@ def _waveforms_to_dict(w: Waveforms) -> dict[str, Any]:
         "dtheta": w.dtheta[thin].tolist(),
         "deflection": w.deflection[thin].tolist(),
         "explained": {name: values[thin].tolist() for name, values in w.explained.items()},
+        "bands": {name: values[thin].tolist() for name, values in w.bands.items()},
     }
 
 
@@ -474,4 +487,5 @@ def _waveforms_from_dict(w: Mapping[str, Any]) -> Waveforms:
     arrays = {name: np.asarray(w[name], dtype=np.float64)
               for name in ("time", "before", "after", "noise", "q", "dtheta", "deflection")}  # fmt: skip
     explained = {name: np.asarray(values, dtype=np.float64) for name, values in w["explained"].items()}
-    return Waveforms(equations=tuple(w["equations"]), explained=explained, **arrays)
+    bands = {name: np.asarray(values, dtype=np.float64) for name, values in w.get("bands", {}).items()}
+    return Waveforms(equations=tuple(w["equations"]), explained=explained, bands=bands, **arrays)

@@ -77,7 +77,8 @@ class Command:
     Attributes:
         controller: how they were driven.
         reference: what they followed.
-        note: where both come from, in words; empty where both were recorded or given.
+        note: what stands in for them, in words; empty where the reference was recorded and the controller gives the
+            measured torque.
     """
 
     controller: Controller
@@ -213,11 +214,7 @@ def command_of(
     wrong = np.sqrt(np.mean((torque - processed.tau_motor) ** 2, axis=0)) / np.where(size > 0.0, size, 1.0)
     worst = int(np.argmax(wrong))
     if wrong[worst] <= REPRODUCED:
-        text = "" if controller is not None else (
-            "forward simulation takes the recorded reference and the velocity controller of `simulate`, which gives "
-            f"the measured torque to {100 * wrong[worst]:.1g} %"
-        )  # fmt: skip
-        return Command(like, reference, text)
+        return Command(like, reference, "")
     which = "the given controller" if controller is not None else "the velocity controller of `simulate`"
     text = (
         f"from the recorded reference {which} gives a torque that is {100 * wrong[worst]:.2g} % off the measured one "

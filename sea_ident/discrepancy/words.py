@@ -26,6 +26,7 @@ class Facts:
         p_value: of the lack of fit.
         trend: comparison of periods.
         change: against a reference.
+        other_motion: whether the held-out data are another motion, not only other periods of the same.
     """
 
     verdict: Verdict
@@ -37,24 +38,48 @@ class Facts:
     p_value: float
     trend: TrendTest
     change: ParameterChange | None
+    other_motion: bool = True
 
 
 def paragraph(facts: Facts) -> str:
     """One paragraph that a person can act on."""
     parts = [_opening(facts)]
     if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
-        worst = max(facts.gap.before, key=lambda j: facts.gap.before[j])
-        parts.append(
-            f"With it the gap on this recording goes from {facts.gap.before[worst]:.3g} to "
-            f"{facts.gap.after[worst]:.3g} N m at {worst}, where it was largest."
-        )
+        parts.append(_gap_sentence(facts.gap))
         if facts.held is not None:
-            parts.append(f"On held-out data the gap shrinks by {100 * facts.held.shrink:.0f} %.")
+            parts.append(_held_sentence(facts))
     if facts.remainder > 0.0:
         parts.append(f"A remainder of {100 * facts.remainder:.2g} % of the torque has no name.")
     if facts.verdict is Verdict.SUSPECT:
         parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
     return " ".join(parts)
+
+
+def _gap_sentence(gap: Gap) -> str:
+    """The gap on the recording, where it was largest; where it is below the noise, what that means."""
+    worst = max(gap.before, key=lambda j: gap.before[j])
+    if gap.before[worst] <= 0.0:
+        return (
+            "It is smaller than the noise of the mean torque in every joint: the pattern over the period shows it, the "
+            "size of the residual does not, and no prediction gets much better by it."
+        )
+    after = gap.after[worst]
+    to = f"to {after:.3g} N m" if after > 0.0 else f"to nothing beyond the noise ({gap.noise[worst]:.2g} N m)"
+    return f"With it the gap on this recording goes from {gap.before[worst]:.3g} {to} at {worst}, where it was largest."
+
+
+def _held_sentence(facts: Facts) -> str:
+    """The gap on held-out data."""
+    held = facts.held
+    if held is None:
+        return ""
+    where = "On the motion that was held out" if facts.other_motion else "On periods that were held out"
+    weaker = "" if facts.other_motion else " (the same motion again, which is a weaker test)"
+    if not any(value > 0.0 for value in held.before.values()):
+        return f"{where}{weaker} the model was within the noise before already."
+    if held.shrink < 0.0:
+        return f"{where}{weaker} the gap grows by {-100 * held.shrink:.0f} %."
+    return f"{where}{weaker} the gap shrinks by {100 * held.shrink:.0f} %."
 
 
 def reservations(facts: Facts, held_out: bool) -> list[str]:
@@ -65,7 +90,12 @@ def reservations(facts: Facts, held_out: bool) -> list[str]:
             f"{facts.periods} periods only: the noise floor is uncertain and small effects are not told from it; "
             f"record {FEW_PERIODS} or more"
         )
-    if facts.missing and not held_out:
+    if facts.missing and held_out and not facts.other_motion:
+        found.append(
+            "no held-out motion was given: every other period of this one was held out, which is weaker, as a wrong "
+            "name repeats itself in every period. Record another motion"
+        )
+    elif facts.missing and not held_out:
         found.append("no held-out motion was given: what is named was not tested on another motion")
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")

@@ -27,9 +27,9 @@ class GapSection(DiagnosisSection):
             ("data that were held out", diagnosis.holdout),
         ):
             if gap is not None:
-                groups.append((_bars(gap, f"On {label}", "N m or N"), 100.0 * gap.shrink))
+                groups.append((_bars(gap, f"On {label}", "N m or N"), _closed(gap)))
         for signal, gap in diagnosis.simulation_gap.items():
-            groups.append((_bars(gap, f"Forward simulation, {signal}", UNITS.get(signal, "")), 100.0 * gap.shrink))
+            groups.append((_bars(gap, f"Forward simulation, {signal}", UNITS.get(signal, "")), _closed(gap)))
         if not groups:
             return None
         return {
@@ -37,6 +37,15 @@ class GapSection(DiagnosisSection):
             "legend": bars_legend(NAMES, ROLES),
             "waves": _waves(diagnosis),
         }
+
+
+def _closed(gap: Gap) -> str:
+    """How much of a gap is closed, in words."""
+    if not any(value > 0.0 for value in gap.before.values()):
+        return "The model was within the noise before already."
+    if gap.shrink < 0.0:
+        return f"The gap is {-100.0 * gap.shrink:.0f} % larger."
+    return f"{100.0 * gap.shrink:.0f} % of the gap is closed."
 
 
 def _bars(gap: Gap, title: str, unit: str) -> Any:

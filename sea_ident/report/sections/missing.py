@@ -6,7 +6,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.diagnosis import Diagnosis, MissingEffect, Waveforms
-from sea_ident.report.chart import Chart, Line, Points
+from sea_ident.report.chart import Band, Chart, Line, Mark, Points
 from sea_ident.report.section import DiagnosisSection
 
 NEIGHBOURS = 5
@@ -57,11 +57,16 @@ def curve(effect: MissingEffect, waves: Waveforms) -> Chart | None:
     left = waves.after[:, e] + torque
     step = max(1, len(torque) // DOTS)
     order = np.argsort(axis, kind="stable")
-    line = (
-        Line(axis[order], torque[order], "after", "the effect") if label.startswith("time") else _smoothed(axis, torque)
-    )
+    over_time = label.startswith("time")
+    line = Line(axis[order], torque[order], "after", "the effect") if over_time else _smoothed(axis, torque)
+    marks: list[Mark] = [Points(axis[::step], left[::step], "before", "residual left to it")]
+    names = [name for name, values in waves.explained.items() if values is explained]
+    if names and names[0] in waves.bands:
+        std = waves.bands[names[0]][:, e]
+        half = 2.0 * (std[order] if over_time else _smoothed(axis, std).y)
+        marks.append(Band(line.x, line.y - half, line.y + half, "after", "\N{PLUS-MINUS SIGN}2 std of the effect"))
     return Chart(
-        [Points(axis[::step], left[::step], "before", "residual left to it"), line],
+        [*marks, line],
         label, f"torque [N m], {waves.equations[e]}", width=900, height=260,
     )  # fmt: skip
 

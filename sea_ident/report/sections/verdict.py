@@ -31,8 +31,11 @@ class VerdictSection(DiagnosisSection):
         lack = diagnosis.lack_of_fit
         tiles = [(str(len(diagnosis.missing)), "effects missing")]
         for label, gap in (("the recording", diagnosis.training), ("held-out data", diagnosis.holdout)):
-            if gap is not None:
+            if gap is not None and any(value > 0.0 for value in gap.before.values()):
                 tiles.append((f"{100 * gap.shrink:.0f} %", f"of the gap closed on {label}"))
+        if "q" in diagnosis.simulation_gap:
+            shrink = diagnosis.simulation_gap["q"].shrink
+            tiles.append((f"{100 * shrink:.0f} %", "of the gap closed in forward simulation of q"))
         equations = list(dict.fromkeys(name for parts in lack.per_joint.values() for name in parts))
         return {
             "level": level,
