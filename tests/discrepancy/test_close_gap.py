@@ -1,0 +1,113 @@
+"""From a model that lacks two effects, one of them in a spring, to one that lacks nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy.data import wide_processing
+from sea_ident.discrepancy.forward import command_of, simulation_gap
+from sea_ident.effects import base_effects, make_effect
+from sea_ident.estimation import identify, read_model
+from sea_ident.simulation import PlantedEffect, VelocityController, simulate
+
+PERIOD = 5.0
+
+
+def planted():
+    return (
+        PlantedEffect(make_effect("spring_offset", "knee"), np.array([1.0])),
+        PlantedEffect(make_effect("torque_ripple", "hip", order=4.0), np.array([1.0, 0.5])),
+    )
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return sea_ident.load_robot("exo_leg")
+
+
+@pytest.fixture(scope="module")
+def recordings(leg):
+    return [
+        simulate(
+            leg,
+            sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed),
+            periods=12,
+            seed=40 + seed,
+            effects=planted(),
+        ).recording
+        for seed in (0, 1)
+    ]
+
+
+@pytest.fixture(scope="module")
+def closed(leg, recordings):
+    training, holdout = recordings
+    return sea_ident.close_gap(sea_ident.identify(leg, training, period=PERIOD), training, holdout=holdout)
+
+
+def without_reference(recording):
+    columns = {name: values for name, values in recording.columns.items() if "reference" not in name}
+    return type(recording)(recording.time, columns, recording.source)
+
+
+def test_both_are_added_and_nothing_is_left(closed):
+    assert closed.verdict == "none"
+    assert set(closed.added) == {("spring_offset", "knee"), ("torque_ripple", "hip")}
+
+
+def test_the_history_shows_the_gap_shrink_in_torque_and_in_simulation(closed):
+    first, last = closed.history[0], closed.history[-1]
+    assert first.torque_held_out[1] < 0.15 * first.torque_held_out[0]
+    assert first.simulation["q"][1] < 0.2 * first.simulation["q"][0]
+    assert not last.named
+    assert last.simulation == {}
+    assert "simulated q" in closed.summary()
+
+
+def test_what_cancels_in_the_motor_torque_is_kept(closed):
+    spring = next(s for s in closed.model.springs if s.joint == "knee")
+    value, std = spring.terms[0].values[0], spring.terms[0].stds[0]
+    assert spring.terms[0].effect.name == "spring_offset"
+    assert abs(value - 1.0) < 5.0 * std
+
+
+def test_saved_read_back_and_diagnosed_again_nothing_is_missing(closed, recordings, tmp_path):
+    closed.model.save(tmp_path / "m.json")
+    again = read_model(tmp_path / "m.json")
+    diagnosis = sea_ident.diagnose(again, recordings[0])
+    assert diagnosis.verdict == "none"
+    assert not diagnosis.missing
+
+
+@pytest.fixture(scope="module")
+def models(leg, recordings):
+    effects = base_effects(leg)
+    whole = (*effects, *(p.effect for p in planted()))
+    return [identify(leg, recordings[0], effects=chosen, period=PERIOD) for chosen in (effects, whole)]
+
+
+def test_without_a_reference_the_measured_motion_stands_in_and_it_is_said(leg, models, recordings):
+    bare = without_reference(recordings[1])
+    found = simulation_gap(*models, bare, wide_processing(bare, leg, PERIOD))
+    assert "the recording has no reference" in found.notes[0]
+    assert found.gaps["q"].shrink > 0.8
+    assert set(found.gaps) == {"q", "theta", "tau"}
+
+
+def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(leg, recordings):
+    processed = wide_processing(recordings[1], leg, PERIOD)
+    true = command_of(leg, recordings[1], processed, VelocityController())
+    assert true.note == ""
+    other = command_of(leg, recordings[1], processed, VelocityController(bandwidth=20.0, feedforward=0.0))
+    assert "the given controller gives a torque that is" in other.note
+    assert "stand in for the reference" in other.note
+
+
+def test_a_model_that_cannot_be_simulated_gives_no_gap_but_the_reason(leg, models, recordings):
+    springs = tuple(replace(s, stiffness=-1.0, linear_stiffness=-1.0) for s in models[0].springs)
+    broken = replace(models[0], springs=springs)
+    found = simulation_gap(broken, models[1], recordings[1], wide_processing(recordings[1], leg, PERIOD))
+    assert found.gaps == {}
+    assert "no forward simulation of the model before the repair" in found.notes[-1]
