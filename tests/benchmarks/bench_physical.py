@@ -1,11 +1,13 @@
 """Physically consistent parameters: time, and what consistency costs on motion that was not used.
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_physical.py
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_physical.py [--seeds 5]
 
 Baxter's left arm (7 joints, series elastic), little and noisy data, so that the unconstrained fit is often impossible.
-Printed: seconds, how often the unconstrained fit is possible, and the torque error of both fits on another motion.
+Printed: seconds of CPU time, how often the unconstrained fit is possible, and the torque error of both fits on another
+motion. What it printed is in results/physical.md.
 """
 
+import argparse
 import time
 import warnings
 
@@ -19,7 +21,6 @@ from sea_ident.regressor import build_total, prior_parameters
 from sea_ident.robot import load_robot
 
 ARM = ["left_s0", "left_s1", "left_e0", "left_e1", "left_w0", "left_w1", "left_w2"]
-SEEDS = 10
 
 
 def motion(seed: int, samples: int) -> Motion:
@@ -32,31 +33,36 @@ def motion(seed: int, samples: int) -> Motion:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=5)
+    count = parser.parse_args().seeds
     warnings.simplefilter("ignore")
     robot = load_robot("example:baxter_description/urdf/baxter.urdf", "baxter_sea", ARM)
     effects = base_effects(robot)
     truth = np.nan_to_num(prior_parameters(robot, effects))
     other = motion(99, 500)
     exact = build_total(robot, effects, other) @ truth
+    print("| noise [N m] | pull | seconds | at most | fit possible | error of the fit [N m] | of the possible [N m] |")
+    print("|---|---|---|---|---|---|---|")
     for noise in (0.2, 2.0):
         for pull in Pull:
             seconds, possible, errors = [], 0, []
-            for seed in range(SEEDS):
+            for seed in range(count):
                 states = motion(seed, 1000)
                 torque = build_total(robot, effects, states) @ truth
                 torque = torque + noise * np.random.default_rng(seed).standard_normal(torque.shape)
                 model = identify(robot, from_states(robot, states, torque), effects=effects, estimator=JointWLS())
-                begin = time.perf_counter()
+                begin = time.process_time()
                 found = physical_parameters(model, pull=pull)
-                seconds.append(time.perf_counter() - begin)
+                seconds.append(time.process_time() - begin)
                 possible += found.consistent
                 both = (model.predict(other), found.model.predict(other))
                 errors.append([np.sqrt(np.mean((table - exact) ** 2)) for table in both])
             free, real = np.mean(errors, axis=0)
             print(
-                f"noise {noise} N m, {pull}: {np.mean(seconds):.2f} s (at most {np.max(seconds):.2f}), unconstrained "
-                f"fit possible {possible} of {SEEDS}; error on another motion {free:.4f} N m unconstrained, "
-                f"{real:.4f} possible"
+                f"| {noise} | {pull} | {np.mean(seconds):.2f} | {np.max(seconds):.2f} | {possible} of {count} | "
+                f"{free:.4f} | {real:.4f} |",
+                flush=True,
             )
 
 

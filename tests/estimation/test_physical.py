@@ -5,10 +5,14 @@ import pinocchio as pin
 import pytest
 
 from estimation.synthetic import record
-from sea_ident.estimation import Box, Pull, identify, physical_parameters
+from sea_ident.effects import base_effects
+from sea_ident.estimation import Box, JointWLS, Pull, identify, physical_parameters
 from sea_ident.estimation.pseudo_inertia import inertial_parameters, pseudo_inertia
 from sea_ident.exceptions import IdentificationError
-from sea_ident.regressor import inverse_dynamics
+from sea_ident.motion import FourierSeries, Motion
+from sea_ident.processing import from_states
+from sea_ident.regressor import build_total, inverse_dynamics, prior_parameters
+from sea_ident.robot import load_robot
 
 
 @pytest.fixture(scope="module")
@@ -87,3 +91,35 @@ def test_mass_lies_inside_its_box(model):
     assert np.all(second <= mass * ((box.lower + box.upper) * centre - box.lower * box.upper) + 1e-6)
     with pytest.raises(IdentificationError, match="no moving link arm"):
         physical_parameters(model, boxes={"arm": box})
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_seven_joints_predict_another_motion_no_worse_than_the_free_fit():
+    arm = load_robot(
+        "example:baxter_description/urdf/baxter.urdf",
+        "baxter_sea",
+        ("left_s0", "left_s1", "left_e0", "left_e1", "left_w0", "left_w1", "left_w2"),
+    )
+    effects = base_effects(arm)
+    parameters = np.nan_to_num(prior_parameters(arm, effects))
+    rng = np.random.default_rng(0)
+
+    def motion(samples):
+        links, springs = (FourierSeries(0.1, np.zeros(7), *(s * rng.normal(size=(2, 7, 5)))) for s in (0.3, 0.01))
+        link, spring = links.sample(samples=samples), springs.sample(samples=samples)
+        motors = (link.q + spring.q, link.dq + spring.dq, link.ddq + spring.ddq)
+        return Motion(link.time, link.q, link.dq, link.ddq, *motors)
+
+    seen, other = motion(600), motion(200)
+    torque = build_total(arm, effects, seen) @ parameters
+    torque = torque + rng.standard_normal(torque.shape)
+    model = identify(arm, from_states(arm, seen, torque), effects=effects, estimator=JointWLS())
+    found = physical_parameters(model)
+    assert not found.consistent
+    assert found.bodies
+    inertias = [place for place, column in enumerate(found.columns) if column.name.endswith(".m")]
+    for first in inertias:
+        assert np.linalg.eigvalsh(pseudo_inertia(found.values[first : first + 10]))[0] > 0.0
+    exact = build_total(arm, effects, other) @ parameters
+    free, possible = (np.sqrt(np.mean((m.predict(other) - exact) ** 2)) for m in (model, found.model))
+    assert possible < 1.02 * free
