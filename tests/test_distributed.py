@@ -20,7 +20,7 @@ distributed = pytest.importorskip(
 )
 
 # what dask and its network library warn of while workers die is theirs
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
+pytestmark = pytest.mark.filterwarnings("ignore")
 PERIOD, WORKERS, FLEET = 2.0, 3, 10
 
 
@@ -109,6 +109,7 @@ def contents(result):
     return result.table.read_text(), {path.name: path.read_text() for path in models}
 
 
+@pytest.mark.slow
 def test_starts_of_an_excitation_on_a_cluster(leg, cluster):
     serial = design(leg)
     with joblib.parallel_config(backend="dask", wait_for_workers_timeout=30):
@@ -119,6 +120,7 @@ def test_starts_of_an_excitation_on_a_cluster(leg, cluster):
     np.testing.assert_array_equal(spread.series.offset, serial.series.offset)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_a_worker_killed_while_it_climbs_a_start(leg, cluster):
     serial = design(leg)
@@ -129,6 +131,7 @@ def test_a_worker_killed_while_it_climbs_a_start(leg, cluster):
     np.testing.assert_array_equal(spread.series.a, serial.series.a)
 
 
+@pytest.mark.slow
 def test_a_fleet_on_a_cluster(slider, fleet, cluster):
     serial = identify_batch(slider, fleet, fleet / "serial", period=PERIOD, jobs=1)
     with joblib.parallel_config(backend="dask", wait_for_workers_timeout=30):
