@@ -100,7 +100,7 @@ def identify(
     observations = Observations(robot, chosen, base, processed)
     if processed.periods == 1 and processed.samples * robot.n * base.rank * 8 > DENSE and not in_springs:
         model, more = identify_long(observations, how, unknown_zero)
-        return _reported(model, [*found, *more], first, processed.notes)
+        return _reported(model, [*found, *more, *_doubts(model)], first, processed.notes)
     estimate = how.estimate(observations)
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
@@ -109,10 +109,16 @@ def identify(
     if prior is not None:
         model = _refitted(updated(model, prior), observations)
     springs = springs_from(observations, model.values, model.uncertainty, unknown_zero, in_springs)
-    found.extend(unseparated_friction(base, model.values, model.uncertainty))
-    found.extend(f"spring of {s.joint}: {s.note}" for s in springs if s.verdict in UNSAFE)
     model = replace(model, springs=springs)
+    found.extend(_doubts(model))
     return _reported(model, found, first, (*processed.notes, *estimate.notes))
+
+
+def _doubts(model: Model) -> list[str]:
+    """What a user should know before trusting the numbers, from the numbers."""
+    found = [*unseparated_friction(model.base, model.values, model.uncertainty)]
+    found.extend(f"spring of {s.joint}: {s.note}" for s in model.springs if s.verdict in UNSAFE)
+    return found
 
 
 def _reported(model: Model, found: list[str], first: int, notes: tuple[str, ...]) -> Model:
