@@ -23,7 +23,10 @@ def batch(
     joints: JointNames = None,
     as_json: AsJson = False,
 ) -> None:
-    """Identify every recording of a folder: past bad ones, on after a kill, into one table."""
+    """Identify every recording of a folder, into one table.
+
+    Bad recordings are rows with the reason; a second run does what is missing, has changed, or failed.
+    """
     from sea_ident.batch import identify_batch
 
     loaded = read_robot(robot, annotation, joints)

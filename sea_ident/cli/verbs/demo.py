@@ -14,7 +14,7 @@ def demo(
     seed: Seed = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Run the whole experiment of the paper on a simulated exoskeleton leg."""
+    """Run the paper's whole experiment on a simulated leg."""
     from sea_ident.demo import STEPS, run_demo
 
     with progress("starting", STEPS) as tell:

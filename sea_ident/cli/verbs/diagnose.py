@@ -31,7 +31,10 @@ def diagnose(
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find where a model and a recording disagree, name the missing effect and repair the model."""
+    """Find where a model is wrong, name what is missing, repair it.
+
+    The model is compared with a recording, and the finding with another motion where there is one.
+    """
     from sea_ident.discrepancy import diagnose as run
     from sea_ident.estimation import read_model
     from sea_ident.recordings import read_recording

@@ -34,7 +34,7 @@ def identify(
     joints: JointNames = None,
     as_json: AsJson = False,
 ) -> None:
-    """Identify the dynamic model of a robot and its springs from a recording."""
+    """Identify the model of a robot and its springs from a recording."""
     from sea_ident.estimation import identify as run
     from sea_ident.recordings import read_recording
 

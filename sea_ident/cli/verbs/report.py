@@ -26,7 +26,10 @@ def report(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write a model or a diagnosis as one HTML file that needs no network."""
+    """Write a model or a diagnosis as one HTML file.
+
+    It needs no network, and no other file.
+    """
     from sea_ident.excitation import read_excitation
     from sea_ident.report import write_report
 

@@ -22,7 +22,10 @@ def simulate(
     joints: JointNames = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate the robot following an excitation, with sensor noise and friction that varies from pass to pass."""
+    """Record a simulated robot that follows an excitation.
+
+    Sensors have noise, and friction varies from pass to pass.
+    """
     from sea_ident.excitation import read_excitation
     from sea_ident.recordings import write_recording
     from sea_ident.simulation import simulate as run

@@ -12,7 +12,10 @@ def validate(
     column: ForeignColumns = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare the torque that a model predicts with a recording that was not used to find it."""
+    """Compare the torque that a model predicts with a recording.
+
+    The recording should be one that was not used to find the model.
+    """
     from sea_ident.estimation import read_model
     from sea_ident.recordings import read_recording
     from sea_ident.validation import validate as run
