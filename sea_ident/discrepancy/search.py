@@ -36,7 +36,10 @@ FAR = 3.0
 misfit, ..."""
 
 BENT = 0.7
-"""... unless that leaves less than this share of the excess: then they were what is wrong."""
+"""... unless that leaves less than this share of the excess: then they were what is wrong, ..."""
+
+COMMON = 2.5
+"""... or they change by less than this factor: as much as one motor may differ from another."""
 
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
@@ -126,9 +129,19 @@ def settle_again(bench: Bench, fit: Fit) -> Settled:
     bent = bench.refine(anchored, noise, start=fit.parameters)
     if bent.statistic > FAR * bent.dof:
         straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
-        if bent.excess > BENT * straight.excess:
+        if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
             return Settled(straight, noise)
     return Settled(bent, noise)
+
+
+def far_from(effects: Sequence[Effect], usual: Sequence[Effect]) -> bool:
+    """Whether a shape of the first effects of a model is further from the usual one than shapes commonly are."""
+    for one, other in zip(effects, usual, strict=False):
+        for shape in one.shapes:
+            pair = float(getattr(one, shape.name)), float(getattr(other, shape.name))
+            if shape.logarithmic and not 1.0 / COMMON < pair[0] / pair[1] < COMMON:
+                return True
+    return False
 
 
 def significance(gain: float, columns: int, tests: int, fit: Fit, noise: NoiseFloor) -> float:
