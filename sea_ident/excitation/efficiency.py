@@ -69,6 +69,16 @@ class EfficiencyBound:
         """D-efficiency of a design: the share of the samples with which the bound would tell as much."""
         return float(np.exp((log_det - self.log_det) / self.columns))
 
+    def summary(self, log_det: float) -> str:
+        """How good a design is at least, and why it may be better, as text."""
+        return (
+            f"log det {log_det:.2f} of at most {self.log_det:.2f}: D-efficiency at least "
+            f"{100.0 * self.efficiency(log_det):.0f} % ({self.columns} columns; largest value searched from "
+            f"{self.searched} states, which still moved the bound by {self.slack:.2f})\n"
+            f"  the bound is loose: it knows which states a motion can reach and that means of total derivatives of "
+            f"degree {_DEGREE} vanish, not that the states follow each other on one closed path"
+        )
+
 
 class _States:
     """The box of states, the columns there, and the conditions on their mean."""
