@@ -145,7 +145,10 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
                 "Repair the sensor and record again"
             )
             fatal = True
-    clipped = _clipped(data)
+    clipped = _clipped(data.period_tau_motor)
+    if not isinstance(recording, ProcessedRecording):
+        # the gear's efficiency turns one limit of a current into two of the torque
+        clipped |= _clipped(_currents(data, recording))
     share = clipped.mean(axis=0)
     for i in np.flatnonzero(share > 0.0):
         name = data.robot.joint_names[int(i)]
@@ -203,11 +206,25 @@ def subset(data: PeriodData, keep: list[int]) -> PeriodData:
     return replace(data, motion=motion, tau_motor=tau.mean(axis=0), period_motions=motions, period_tau_motor=tau)
 
 
-def _clipped(data: PeriodData) -> NDArray[np.bool_]:
-    """(N, n) samples at which the torque stays at the largest value of its joint, in most periods."""
-    out = np.zeros(data.tau_motor.shape, dtype=np.bool_)
-    for i in range(data.robot.n):
-        tau = data.period_tau_motor[:, :, i]
+def _currents(data: PeriodData, recording: Recording) -> FloatArray:
+    """(P, N, n) currents of the last whole periods, zero where there are none of the same samples [A]."""
+    samples = data.samples
+    periods = recording.samples // samples
+    out = np.zeros((max(periods, 1), samples, data.robot.n))
+    even = recording.is_uniform and abs(data.period * recording.sample_rate - samples) < 0.01
+    for i, name in enumerate(data.robot.joint_names):
+        if even and periods and recording.has("current", name):
+            out[:, :, i] = recording.columns[f"current_{name}"][-periods * samples :].reshape(periods, samples)
+    return out
+
+
+def _clipped(torque: FloatArray) -> NDArray[np.bool_]:
+    """(N, n) samples at which the torque (P, N, n) stays at the largest value of its joint, in most periods."""
+    out = np.zeros(torque.shape[1:], dtype=np.bool_)
+    for i in range(torque.shape[2]):
+        tau = torque[:, :, i]
+        if not np.any(tau):
+            continue
         for extreme in (tau.max(), tau.min()):
             at = np.isclose(tau, extreme, rtol=1e-9, atol=0.0)
             often = at.mean(axis=0) > 0.5

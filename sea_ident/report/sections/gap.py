@@ -9,7 +9,7 @@ from sea_ident.report.section import DiagnosisSection
 
 ROLES = ("before", "after", "noise")
 NAMES = ("as it was", "with the effects", "noise")
-UNITS = {"q": "rad or m", "theta": "rad or m", "tau": "N m or N"}
+UNITS = {"q": ("mrad or mm", 1e3), "theta": ("mrad or mm", 1e3), "tau": ("N m or N", 1.0)}
 
 
 class GapSection(DiagnosisSection):
@@ -29,7 +29,8 @@ class GapSection(DiagnosisSection):
             if gap is not None:
                 groups.append((_bars(gap, f"On {label}", "N m or N"), _closed(gap)))
         for signal, gap in diagnosis.simulation_gap.items():
-            groups.append((_bars(gap, f"Forward simulation, {signal}", UNITS.get(signal, "")), _closed(gap)))
+            unit, scale = UNITS.get(signal, ("", 1.0))
+            groups.append((_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap)))
         if not groups:
             return None
         return {
@@ -48,10 +49,10 @@ def _closed(gap: Gap) -> str:
     return f"{100.0 * gap.shrink:.0f} % of the gap is closed."
 
 
-def _bars(gap: Gap, title: str, unit: str) -> Any:
+def _bars(gap: Gap, title: str, unit: str, scale: float = 1.0) -> Any:
     joints = list(gap.before)
     series = {
-        name: [part[joint] for joint in joints]
+        name: [scale * part[joint] for joint in joints]
         for name, part in zip(NAMES, (gap.before, gap.after, gap.noise), strict=True)
     }
     return bars(joints, series, ROLES, title, unit)
