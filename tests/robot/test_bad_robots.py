@@ -8,6 +8,7 @@ from urdfs import ARM, build, joint, link, sea, urdf
 
 from sea_ident.exceptions import RobotError, SeaIdentError, SeaIdentWarning
 from sea_ident.robot import load_robot, robot_from_text, robots_folder
+from sea_ident.robot.xml import parse_xml
 
 BOMB = (
     '<!DOCTYPE robot [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">'
@@ -254,3 +255,11 @@ def test_warnings_are_heard_and_kept() -> None:
 
 def test_every_error_is_of_one_family() -> None:
     assert issubclass(RobotError, SeaIdentError)
+
+
+def test_entities_of_other_files_are_not_opened(tmp_path):
+    other = tmp_path / "other.xml"
+    other.write_text("<unclosed")  # were it read, the text would be malformed
+    text = f'<!DOCTYPE r [<!ENTITY other SYSTEM "{other.as_uri()}">]><robot name="r">&other;</robot>'
+    with pytest.raises(RobotError, match="DOCTYPE"):
+        parse_xml(text, "test")
