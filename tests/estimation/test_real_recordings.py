@@ -170,7 +170,9 @@ def test_stated_repeatability_is_the_scatter_between_real_periods(name, emps_mod
     scatter = values.std(axis=0, ddof=1) / np.sqrt(len(values))
     stated = np.sqrt(np.diag(model.uncertainty.repeatability))
     # few periods: the scatter itself is known to a factor of about two
-    assert 0.5 < np.sqrt(np.mean((scatter / stated) ** 2)) < 2.0
+    assert 0.5 < np.sqrt(np.mean((scatter / stated) ** 2)) < (1.5 if name == "emps" else 2.0)
+    # from period to period the axis changes by more than the scatter within a period explains
+    assert any("whole periods differ" in text for text in model.warnings) == (name == "emps")
     # what the model lacks counts, too: what is stated in all is never less than the scatter
     assert np.all(model.std > scatter)
 

@@ -52,6 +52,34 @@ def test_few_periods_are_judged_piece_by_piece(leg, coarse):
     assert 0.90 <= reported <= 0.99
 
 
+def drifting(leg, coarse, seed, size):
+    """Three periods; the torque of every joint has another gain in each of them."""
+    recording = record(leg, coarse, 3, seed=seed, torque_noise=0.2)
+    rng = np.random.default_rng(1000 + seed)
+    columns = {}
+    for joint in leg.joint_names:
+        torque = recording.columns[f"tau_motor_{joint}"]
+        columns[f"tau_motor_{joint}"] = torque * np.repeat(1.0 + size * rng.standard_normal(3), len(torque) // 3)
+    return recording.replace_columns(columns)
+
+
+def test_a_gain_that_drifts_from_period_to_period_is_inside_the_intervals_of_few_periods(leg, coarse):
+    inside = []
+    for seed in range(12):
+        model = identify(leg, drifting(leg, coarse, seed, 0.01), period=10.0)
+        error = np.abs(model.values - model.base.project(coarse.parameters))
+        inside.append(error <= model.uncertainty.half_width())
+    assert np.mean(inside) > 0.88
+
+
+def test_nothing_drifts(leg, coarse):
+    told = [
+        any("whole periods differ" in text for text in identify(leg, drifting(leg, coarse, seed, 0.0)).warnings)
+        for seed in range(12)
+    ]
+    assert np.mean(told) < 0.3
+
+
 def test_stated_deviations_match_the_scatter_between_repeats(leg, coarse):
     models = [
         identify(leg, record(leg, coarse, 10, seed=seed, torque_noise=0.2, reversal_noise=0.5), period=10.0)
