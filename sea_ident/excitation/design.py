@@ -101,7 +101,7 @@ def design_excitation(
     )
     given = None if start is None else _check_start(start, problem, notes)
     found = climb_from_starts(problem, starts, seed, given, jobs, progress)
-    if not np.isfinite(max(found.values)):
+    if not np.isfinite(problem.reported(found.coefficients)):
         raise ExcitationError(
             "no trajectory was found that shows all parameters and stays inside all limits between samples too; take "
             "wider limits, more starts, or fewer effects"

@@ -30,6 +30,7 @@ from sea_ident.robot import Limits, Robot
 # points of the walls' grids per harmonic
 _LINEAR_POINTS = 32
 _DYNAMIC_POINTS = 16
+_SPACE_POINTS = 40
 # part of torque limits left free for what a proof for all times takes
 _RESERVE = 2e-3
 # part of the velocity range within which friction turns over for the walls
@@ -99,7 +100,7 @@ class Problem:
                 )
             )
         if len(space):
-            nonlinear.append(SpaceWall.of(space, frequency, harmonics, _DYNAMIC_POINTS * harmonics))
+            nonlinear.append(SpaceWall.of(space, frequency, harmonics, _SPACE_POINTS * harmonics))
         position = comfortable_position(
             linear, nonlinear, harmonics, _describer(dynamic, space), np.random.default_rng([seed, 2**31])
         )

@@ -157,8 +157,16 @@ def climb_from_starts(
             raise
         interrupted = True
     reached = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
-    best = max(reached, key=lambda start: reached[start])
-    return Found(problem.settle(board.latest[best]), tuple((board.values or reached).values()), interrupted)
+    # what it takes to be inside between the grid points too may cost one much and another nothing
+    order = sorted(reached, key=lambda start: -reached[start])
+    chosen = problem.settle(board.latest[order[0]])
+    for start in order[1:]:
+        if reached[start] <= problem.reported(chosen):
+            break
+        settled = problem.settle(board.latest[start])
+        if problem.reported(settled) > problem.reported(chosen):
+            chosen = settled
+    return Found(chosen, tuple((board.values or reached).values()), interrupted)
 
 
 def _scout(problem: Problem, board: _Board, seed: int, given: FloatArray | None, start: int) -> float:
