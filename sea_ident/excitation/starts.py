@@ -140,16 +140,22 @@ def climb_from_starts(
             board.latest.update(zip(order, points, strict=True))
         board.values = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
         best = max(order, key=lambda start: board.values[start])
-        information = _detailed(problem, board.latest[best])
+        # the two best go on side by side, as the best may be stuck; few moves all go to the best
+        ahead = sorted(order, key=lambda start: -board.values[start])[: 2 if count > _TOGETHER else 1]
+        judges = {start: _detailed(problem, board.latest[start]) for start in ahead}
         for first in range(0, count, _TOGETHER):
-            base = board.latest[best]
+            bases = [ahead[move % len(ahead)] for move in range(first, min(first + _TOGETHER, count))]
             moved = parallel(
-                delayed(_move)(problem, information, base, [seed, move, 1], board.stop)
-                for move in range(first, min(first + _TOGETHER, count))
+                delayed(_move)(problem, judges[base], board.latest[base], [seed, first + k, 1], board.stop)
+                for k, base in enumerate(bases)
             )
-            value, point = max(moved, key=lambda pair: pair[0])
-            if value > problem.value(information, base):
-                board.note(best, value, point)
+            for start in ahead:
+                own = [pair for base, pair in zip(bases, moved, strict=True) if base == start]
+                value, point = max(own, key=lambda pair: pair[0], default=(-np.inf, board.latest[start]))
+                if value > problem.value(judges[start], board.latest[start]):
+                    board.note(start, value, point)
+        best = max(ahead, key=lambda start: problem.reported(board.latest[start]))
+        information = judges[best]
         _polish(problem, information, board, best)
     except KeyboardInterrupt:
         board.stop.set()
