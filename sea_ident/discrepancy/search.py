@@ -11,6 +11,7 @@ from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, whit
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
+from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 
 FAMILY_LEVEL = 1e-3
@@ -61,6 +62,9 @@ FINALISTS = 4
 
 LAST_TWO = 2
 """Of these the best are compared with the shapes of the model refined too."""
+
+EDGE_STEP = 16
+"""Edges of a push are first moved by this part of the period."""
 
 LITTLE_LEFT = 0.02
 """An effect that leaves less than this share of the excess is only compared with those that promise more than it."""
@@ -251,7 +255,32 @@ def refitted(
         first = effect.amounts[0].name
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
     fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
-    return min(fits, key=lambda fit: fit.statistic)
+    best = min(fits, key=lambda fit: fit.statistic)
+    return with_sharp_edges(bench, best, noise, len(before)) if isinstance(effect, ExternalForce) else best
+
+
+def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A fit with the begin and the end of a push moved by smaller and smaller steps, down to one sample.
+
+    The statistic jumps from sample to sample, so there is no derivative to follow.
+    """
+    period, samples = bench.data.period, bench.data.samples
+    interval = period / samples
+    step = max(samples // EDGE_STEP, 1)
+    while step:
+        better = fit
+        for name in ("start", "stop"):
+            for sign in (-1, 1):
+                effects = list(better.effects)
+                moved_edge = float(np.mod(getattr(effects[position], name) + sign * step * interval, period))
+                effects[position] = replace(effects[position], **{name: moved_edge})  # type: ignore[arg-type]
+                new = bench.fit(effects, noise, start=better.parameters, tangents=False)
+                if new.statistic < better.statistic:
+                    better = new
+        if better is fit:
+            step //= 2
+        fit = better
+    return bench.fit(fit.effects, noise, start=fit.parameters)
 
 
 def of_every_kind(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
