@@ -23,7 +23,7 @@ from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.search import Selection
 from sea_ident.effects import Effect, Side
 from sea_ident.estimation import Model
-from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.exceptions import SeaIdentError
 from sea_ident.excitation import Criterion, Discrimination, DOptimality, Excitation, PredictedMotors, design_excitation
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.robot import Robot
@@ -73,45 +73,50 @@ class Pair:
         return _label(self.own.effects[self.own_position]), _label(self.rival.effects[self.rival_position])
 
 
-def ambiguous_pair(selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]) -> Pair | None:
-    """The named effect with the most similar alternative; None where all are told apart."""
+def ambiguous_pairs(selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]) -> list[Pair]:
+    """The named effect that is the hardest to tell, with all its alternatives, the most similar first."""
     found = [(a.cos2, position, a.fit) for position, own in alternatives.items() for a in own if a.fit is not None]
-    if not found:
-        return None
-    _, position, fit = max(found, key=lambda each: each[0])
-    return Pair(selection.final.fit, position, fit, position)
+    found.sort(key=lambda each: -each[0])
+    return [Pair(selection.final.fit, k, fit, k) for _, k, fit in found if k == found[0][1]]
 
 
-def propose(bench: Bench, noise: NoiseFloor, pair: Pair, model: Model) -> tuple[NextExperiment | None, tuple[str, ...]]:
-    """Design the motion that tells a pair apart best, inside all limits of the robot.
+def propose(
+    bench: Bench, noise: NoiseFloor, pairs: Sequence[Pair], model: Model
+) -> tuple[NextExperiment | None, tuple[str, ...]]:
+    """Design the motion that tells an effect from its alternatives best, inside all limits of the robot.
 
     Args:
         bench: the recording that does not tell them apart.
         noise: its noise floor.
-        pair: both.
+        pairs: the effect with each alternative.
         model: the repaired model, for bodies and springs.
 
     Returns:
         The experiment, None where no better motion was found, and warnings.
     """
-    now = separation(bench, noise, pair)
+    now = [separation(bench, noise, pair) for pair in pairs]
     robot, motors = _identified(model)
-    best: tuple[float, Excitation] | None = None
+    best: tuple[float, list[float], Excitation] | None = None
     reasons: list[str] = []
-    for excitation in _designs(robot, motors, bench, noise, pair, reasons):
-        there = separation(Bench(_data_of(bench.data, robot, excitation.series, motors), bench.effects), noise, pair)
-        if best is None or there > best[0]:
-            best = (there, excitation)
-        if there > PLENTY:
+    for excitation in _designs(robot, motors, bench, noise, pairs[0], reasons):
+        other = Bench(_data_of(bench.data, robot, excitation.series, motors), bench.effects)
+        there = [separation(other, noise, pair) for pair in pairs]
+        score = float(np.sum(np.log(np.maximum(there, 1.0))))
+        if best is None or score > best[0]:
+            best = (score, there, excitation)
+        if min(there) > PLENTY:
             break
-    first, second = pair.names
+    first, second = pairs[0].names
     if best is None:
         return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
-    there, excitation = best
-    gain = float(np.sqrt(there / max(now, 1.0)))
-    if gain < WORTHWHILE or there < SMALLEST_ENERGY:
-        return None, (f"of the motions that were tried inside the limits none tells {first} from {second} better",)
-    return NextExperiment((first, second), excitation.to_dict(), gain), ()
+    _, there, excitation = best
+    gains = [float(np.sqrt(new / max(old, 1.0))) for new, old in zip(there, now, strict=True)]
+    told = [k for k in range(len(pairs)) if there[k] >= SMALLEST_ENERGY and gains[k] >= WORTHWHILE]
+    untold = [pairs[k].names[1] for k in range(len(pairs)) if k not in told]
+    notes = (f"of the motions that were tried inside the limits none tells {first} from {', '.join(untold)}",)
+    if not told:
+        return None, notes
+    return NextExperiment(pairs[told[0]].names, excitation.to_dict(), gains[told[0]]), notes if untold else ()
 
 
 def separation(bench: Bench, noise: NoiseFloor, pair: Pair) -> float:
@@ -166,7 +171,7 @@ def _designs(
         springs = effects is not None and any(e.side is Side.SPRING for e in (*effects, own, rival))
         try:
             with python_warnings.catch_warnings():
-                python_warnings.simplefilter("ignore", SeaIdentWarning)
+                python_warnings.simplefilter("ignore")
                 yield design_excitation(
                     robot,
                     base_frequency=1.0 / bench.data.period,
@@ -244,11 +249,11 @@ def with_next_experiment(
     diagnosis: Diagnosis, bench: Bench, selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]
 ) -> Diagnosis:
     """An ambiguous diagnosis with the experiment that would tell, and what to do in its text."""
-    pair = ambiguous_pair(selection, alternatives)
-    if pair is None or diagnosis.model is None:
+    pairs = ambiguous_pairs(selection, alternatives)
+    if not pairs or diagnosis.model is None:
         return diagnosis
-    found, notes = propose(bench, selection.final.noise, pair, diagnosis.model)
-    first, second = pair.names
+    found, notes = propose(bench, selection.final.noise, pairs, diagnosis.model)
+    first, second = pairs[0].names if found is None else found.separates
     if found is None:
         advice = (
             f"None of the motions that were tried inside the limits of the robot tells {first} from {second}: look at "
