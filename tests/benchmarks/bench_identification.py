@@ -1,6 +1,7 @@
 """Do the intervals hold the truth, is the estimate unbiased, and what is weighting by sample worth?
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--keep FILE]
+        [--estimators default "one variance per joint"]
 
 Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with and without friction that
 varies from pass to pass. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
@@ -60,7 +61,9 @@ def gait(robot) -> Motion:
     return series.sample(samples=400)
 
 
-def one_seed(pool: Pool, seed: int, sensors: Sensors, springs: bool) -> dict[str, tuple[np.ndarray, ...]]:
+def one_seed(
+    pool: Pool, sensors: Sensors, labels: list[str], springs: bool, seed: int
+) -> dict[str, tuple[np.ndarray, ...]]:
     """Per estimator: error, standard deviation and half width of every parameter."""
     warnings.simplefilter("ignore")
     robot = pool.robot
@@ -70,7 +73,8 @@ def one_seed(pool: Pool, seed: int, sensors: Sensors, springs: bool) -> dict[str
     processed = process(draw(pool, seed, PERIODS, sensors), robot, period=10.0)
     observations = Observations(robot, effects, base, processed)
     found = {}
-    for name, estimator in ESTIMATORS.items():
+    for name in labels:
+        estimator = ESTIMATORS[name]
         estimate = estimator.estimate(observations)
         uncertainty = honest_uncertainty(observations, estimate)
         error, std, half = estimate.values - exact, uncertainty.std, uncertainty.half_width()
@@ -78,7 +82,7 @@ def one_seed(pool: Pool, seed: int, sensors: Sensors, springs: bool) -> dict[str
             laws = springs_from(observations, estimate.values, uncertainty)
             error, std, half = joined(error, std, half, laws, pool)
         found[name] = (error, std, half)
-    if springs:
+    if springs and len(labels) == len(ESTIMATORS):
         model = identify_one_shot(robot, processed)
         parts = (model.values - exact, model.std, model.uncertainty.half_width())
         found["one shot"] = joined(*parts, model.springs, pool)
@@ -108,12 +112,14 @@ def table(title: str, names: list[str], results: list[dict]) -> None:
 
 
 def weightings(pool: Pool, results: list[dict]) -> None:
+    if "one variance per joint" not in results[0]:
+        return  # nothing to compare with
     robot = pool.robot
     effects = base_effects(robot)
     base = find_base_parameters(robot, effects)
     rows = base_rows(robot, effects, base, gait(robot))
     count = base.rank
-    errors = {label: np.array([r[label][0][:count] for r in results]) for label in ESTIMATORS}
+    errors = {label: np.array([r[label][0][:count] for r in results]) for label in ESTIMATORS if label in results[0]}
     reference = (errors["one variance per joint"] ** 2).mean(axis=0)
     print(
         "\n  estimator                mean squared error / one variance per joint    rms torque error on a gait [N m]"
@@ -128,6 +134,7 @@ def weightings(pool: Pool, results: list[dict]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--estimators", nargs="+", choices=ESTIMATORS, default=list(ESTIMATORS))
     parser.add_argument("--keep", type=Path, help="file of seeds that are done; a run that was cut goes on from it")
     arguments = parser.parse_args()
     for title, name, settings in (
@@ -139,7 +146,7 @@ def main() -> None:
         names = find_base_parameters(pool.robot, base_effects(pool.robot)).names
         names = [*names, *(f"{j} {k}" for j in pool.robot.joint_names for k in ("K1", "K3", "D"))]
 
-        run = partial(one_seed, pool, sensors=Sensors(), springs=name == "jitter")
+        run = partial(one_seed, pool, Sensors(), arguments.estimators, name == "jitter")
         results = each_seed(arguments.keep, name, range(arguments.seeds), run)
         table(title, names, results)
         weightings(pool, results)
