@@ -10,6 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.data import PeriodData, period_data, waveform, wide_processing
 from sea_ident.discrepancy.diagnosis import (
@@ -30,7 +31,7 @@ from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, own_torque, search
+from sea_ident.discrepancy.search import Selection, own_torque, search, settle
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
@@ -44,6 +45,12 @@ from sea_ident.simulation import Controller
 
 FEWEST_PERIODS = 10
 """Periods from which on an effect is named without reservation."""
+
+FEWEST_TO_SEARCH = 3
+"""Periods below which no finer effect is looked for: one difference of two periods is no noise floor."""
+
+LARGEST_LEFT = 0.1
+"""Share of the torque that may be left beside what few periods name [-]."""
 
 LACK_LEVEL = 1e-3
 """Probability below which a remainder counts as something that is missing."""
@@ -114,7 +121,12 @@ def diagnose(
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
     basic = completed(bench)
-    selection = search(bench, bench.effects) if basic is None else basic.selection
+    if basic is not None:
+        selection = basic.selection
+    elif data.periods < FEWEST_TO_SEARCH:
+        selection = _unsearched(bench)
+    else:
+        selection = search(bench, bench.effects)
     tell("comparing the periods", 0.5)
     trends = compare_periods(bench, selection.final.fit, selection.final.noise, temperature)
     tell("looking for alternatives", 0.6)
@@ -137,6 +149,13 @@ def diagnose(
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return diagnosis
+
+
+def _unsearched(bench: Bench) -> Selection:
+    """The model as it is, and what could have been seen beside it."""
+    start = settle(bench, bench.effects)
+    candidates = tuple(scan(bench, start.fit, start.noise))
+    return Selection(start, start, 0, (), candidates, max(sum(c.tests for c in candidates), 1))
 
 
 def _as_identified(
@@ -251,6 +270,8 @@ def _verdict(
         return Verdict.NONE
     if any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
         return Verdict.SUSPECT
+    if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
+        return Verdict.CANNOT_TELL
     if large and unexplained > UNEXPLAINED and not trends.trends:
         return Verdict.NOT_IN_LIBRARY
     if any(m.alternatives for m in structural):
