@@ -138,7 +138,7 @@ def interrupted(program, *arguments):
     command = [sys.executable, "-c", program + "from sea_ident.cli import main\nmain()\n", *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() == "now\n"
+        assert process.stdout.readline().startswith("now")  # of several threads, perhaps
         process.send_signal(2)
         _, errors = process.communicate(timeout=120)
     assert "Traceback" not in errors
