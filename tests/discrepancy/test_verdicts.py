@@ -1,0 +1,198 @@
+"""Every verdict can be reached, and input that proves nothing never gets a name."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.check import Findings
+from sea_ident.discrepancy.diagnose import _verdict
+from sea_ident.discrepancy.diagnosis import Alternative, MissingEffect
+from sea_ident.effects import make_effect
+from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
+from sea_ident.motion import FourierSeries
+from sea_ident.simulation import PlantedEffect, simulate
+
+PERIOD = 5.0
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return sea_ident.load_robot("exo_leg")
+
+
+@pytest.fixture(scope="module")
+def series(leg):
+    return [
+        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
+        for seed in (0, 1)
+    ]
+
+
+def scaled(series, amplitude):
+    return FourierSeries(series.base_frequency, series.offset, amplitude * series.a, amplitude * series.b)
+
+
+def recorded(leg, series, planted=(), periods=12, seed=70):
+    return simulate(leg, series, periods=periods, seed=seed, effects=planted).recording
+
+
+def named(name, joint, values, **shape):
+    return PlantedEffect(make_effect(name, joint, **shape), np.array(values, dtype=float))
+
+
+@pytest.fixture(scope="module")
+def intact(leg, series):
+    return recorded(leg, series[0])
+
+
+@pytest.fixture(scope="module")
+def model(leg, intact):
+    return sea_ident.identify(leg, intact, period=PERIOD)
+
+
+def identified(leg, recording):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return sea_ident.identify(leg, recording, period=PERIOD)
+
+
+def quietly(*arguments, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return sea_ident.diagnose(*arguments, **options)
+
+
+def test_none(model, intact):
+    assert quietly(model, intact).verdict is Verdict.NONE
+
+
+def test_named_and_held_out_periods_are_called_weaker(leg, series):
+    recording = recorded(leg, series[0], [named("torque_ripple", "hip", [1.0, 0.5], order=4.0)])
+    found = quietly(identified(leg, recording), recording)
+    assert found.verdict is Verdict.NAMED
+    assert (found.missing[0].effect, found.missing[0].joint) == ("torque_ripple", "hip")
+    assert "periods" in found.holdout_source
+    assert found.holdout.shrink > 0.7
+    assert "weaker" in found.text
+    assert any("every other period" in text for text in found.warnings)
+    assert found.simulation_gap["q"].shrink > 0.5
+
+
+def test_ambiguous_with_the_experiment_that_tells(leg, series):
+    recording = recorded(leg, scaled(series[0], 0.3), [named("spring_offset", "knee", [0.5])])
+    found = quietly(identified(leg, recording), recording)
+    assert found.verdict is Verdict.AMBIGUOUS
+    assert {"spring_offset", "encoder_offset"} >= {m.effect for m in found.missing}
+    record = found.to_dict()["next_experiment"]
+    assert record["gain"] > 1.1
+    assert min(record["excitation"]["margins"].values()) >= 0.0
+    assert "next experiment" in found.text
+
+
+def test_only_against_the_reference(leg, series, model):
+    payload = make_effect("payload", "ankle")
+    values = np.resize([1.5, 0.0, 0.0, 0.15, 0.05, 0.05, 0.01, 0.0, 0.0, 0.0], len(payload.columns(leg)))
+    recording = recorded(leg, series[0], [PlantedEffect(payload, values)])
+    refitted = identified(leg, recording)
+    found = quietly(refitted, recording, reference=model)
+    assert found.verdict is Verdict.ONLY_AGAINST_REFERENCE
+
+
+def test_cannot_tell_from_one_pass(leg, series, model):
+    motion = recorded(leg, series[0], periods=1)
+    assert quietly(model, motion).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
+
+
+def test_every_verdict_follows_from_findings():
+    class Data:
+        periods = 20
+
+    class Bench:
+        data = Data()
+
+    class Trends:
+        unnamed = False
+
+    effect = MissingEffect("torque_ripple", "hip", (), 0.05, 1e-9, ())
+    other = replace(effect, alternatives=(Alternative("torque_offset", "hip", 1.0),))
+
+    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False):
+        return _verdict(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal))
+
+    assert verdict([]) is Verdict.NONE
+    assert verdict([effect]) is Verdict.NAMED
+    assert verdict([effect], remainder=0.01) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([other]) is Verdict.AMBIGUOUS
+    assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
+    assert verdict([], remainder=0.01) is Verdict.NOT_IN_LIBRARY
+    assert verdict([effect], fatal=True) is Verdict.CANNOT_TELL
+
+
+# -- input that proves nothing
+
+
+def changed(recording, **columns):
+    return type(recording)(recording.time, {**recording.columns, **columns}, "changed")
+
+
+def test_a_holdout_of_another_robot_is_refused(model, intact):
+    columns = {name.replace("_knee", "_elbow"): values for name, values in intact.columns.items()}
+    other = type(intact)(intact.time, columns, "elbow")
+    with pytest.raises(DiagnosisError, match="another robot"):
+        sea_ident.diagnose(model, intact, holdout=other)
+
+
+def test_a_model_of_another_robot_is_refused(intact):
+    time = np.arange(2000) * 0.01
+    q = 0.1 * np.sin(2 * np.pi * time / 5)
+    slide = type(intact)(
+        time, {"q_slider": q, "tau_motor_slider": 50 * np.gradient(np.gradient(q, 0.01), 0.01)}, "slide"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        foreign = sea_ident.identify(sea_ident.load_robot("emps"), slide, period=5.0)
+    with pytest.raises(DiagnosisError, match="another robot"):
+        sea_ident.diagnose(foreign, intact)
+
+
+def test_the_same_samples_under_another_name_are_refused(model, intact):
+    half = slice(len(intact.time) // 2, None)
+    part = {name: values[half] for name, values in intact.columns.items()}
+    with pytest.raises(DiagnosisError, match="proves nothing"):
+        sea_ident.diagnose(model, intact, holdout=type(intact)(intact.time[half], part, "half of it"))
+
+
+def test_the_order_of_the_columns_does_not_matter(model, intact):
+    turned = type(intact)(intact.time, dict(reversed(intact.columns.items())), "turned")
+    assert quietly(model, turned, period=PERIOD).verdict is Verdict.NONE
+
+
+def test_spikes_are_left_out_and_said(model, intact):
+    values = intact.columns["q_knee"].copy()
+    values[[1300, 1301]] += 0.2
+    found = quietly(model, changed(intact, q_knee=values), period=PERIOD)
+    assert any("spikes in period(s)" in text for text in found.warnings)
+    assert found.verdict in (Verdict.NONE, Verdict.CANNOT_TELL)
+
+
+@pytest.mark.slow
+def test_a_clipped_torque_gets_no_confident_name(leg, model, intact):
+    name = next(c for c in intact.columns if c.endswith("_knee") and c.startswith(("tau_motor", "current")))
+    limit = 0.5 * np.abs(intact.columns[name]).max()
+    clipped = changed(intact, **{name: np.clip(intact.columns[name], -limit, limit)})
+    found = quietly(model, clipped, period=PERIOD)
+    assert found.verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
+    assert any("clipped" in text for text in found.warnings)
+
+
+def test_a_holdout_of_one_period_is_said_to_test_nothing(leg, series, model, intact):
+    once = recorded(leg, series[1], periods=1)
+    try:
+        found = quietly(model, intact, holdout=once)
+    except SeaIdentError:
+        return
+    assert any("held-out recording" in text for text in found.warnings)
