@@ -1,13 +1,14 @@
-"""Every estimator in six noise settings, and on measured data beside published values.
+"""Every estimator in seven noise settings, and on measured data beside published values.
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_estimators.py [--seeds 300] [--keep FILE]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_estimators.py [--seeds 300] [--further 100]
+        [--keep FILE]
 
 Settings: white torque noise; coloured torque noise (correlation time 0.25 s); encoder noise ten times the usual; a
-controller with high gains, which makes torque and motion of the noise of its encoders (ten times the usual). On a third
-of the seeds further ones that show where estimators break: encoder noise thirty times the usual, feedback of noise a
-hundred times the usual, spikes of a hundred times the noise in one sample of a thousand. Coverage of 95 % intervals as
-reported (spread between periods) and by eq. 13, bias, rms error relative to least squares, seconds of CPU time per
-estimate. Maximum likelihood runs on every tenth seed.
+controller with high gains, which makes torque and motion of the noise of its encoders (ten times the usual). Further
+ones that show where estimators break: encoder noise thirty times the usual, feedback of noise a hundred times the
+usual, spikes of a hundred times the noise in one sample of a thousand. Coverage of 95 % intervals as reported (spread
+between periods) and by eq. 13, bias, rms error relative to least squares, seconds of CPU time per estimate.
+Maximum likelihood runs on every tenth seed.
 
 The motion is exact, periodic and smooth, its torques are exact (20 periods of 10 s at 50 Hz), so that nothing but the
 noise is wrong. Feedback: the noise n of all encoders moves the joints by -T n, with T of second order (60 rad/s,
@@ -62,7 +63,7 @@ SETTINGS = {
     "spikes": {"spikes": 1e-3},
 }
 EXTRA = tuple(SETTINGS)[4:]
-"""Settings for which a third of the seeds will do."""
+"""The further settings, for which fewer seeds will do."""
 
 HARMONICS = 150
 """Kept in q and theta: real friction bends the motion at every reversal, so that data ask for as many. Of these smooth
@@ -203,6 +204,7 @@ def emps() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=300)
+    parser.add_argument("--further", type=int, default=100, help="seeds of the further settings")
     parser.add_argument("--keep", type=Path, help="file of seeds that are done; a run that was cut goes on from it")
     arguments = parser.parse_args()
     emps()
@@ -213,7 +215,7 @@ def main() -> None:
         def one(seed: int, noise: dict[str, float] = noise) -> Found:
             return estimates(measured(truth, seed, **noise), truth.parameters, seed % 10 == 0)
 
-        seeds = range(arguments.seeds // 3 if title in EXTRA else arguments.seeds)
+        seeds = range(arguments.further if title in EXTRA else arguments.seeds)
         table(title, names, each_seed(arguments.keep, title, seeds, one))
 
 
