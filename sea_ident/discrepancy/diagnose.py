@@ -31,7 +31,7 @@ from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, own_torque, search, settle
+from sea_ident.discrepancy.search import Selection, own_torque, search, settle, without
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
@@ -133,6 +133,12 @@ def diagnose(
     alternatives = assess.rivals(bench, selection) if basic is None else {}
     tell("testing on held-out data", 0.75)
     held, held_notes = held_out(bench, selection, holdout)
+    weak = [] if held is None else [k for k, found in enumerate(held.transfers) if not found.holds]
+    if held is not None and 0 < len(weak) < selection.added and held.other_motion:
+        # what does not hold elsewhere beside what does was the form of the latter, no effect of its own
+        selection = without(bench, selection, weak)
+        alternatives = assess.rivals(bench, selection)
+        held, held_notes = held_out(bench, selection, holdout)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)

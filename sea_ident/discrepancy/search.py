@@ -45,7 +45,7 @@ COMMON = 2.5
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
 
-CANCELLED = 0.05
+CANCELLED = 0.02
 """... with more than this share of it not taken up by other parameters."""
 
 SCATTER_LEVEL = 1e-4
@@ -442,3 +442,27 @@ def _eliminate(bench: Bench, now: Settled, added: list[float], tests: int) -> tu
         now = settle_again(bench, worst[2])
         del added[worst[1] - first]
     return now, added
+
+
+def without(bench: Bench, selection: Selection, weak: Sequence[int]) -> Selection:
+    """What was found without some of it, the rest fitted anew.
+
+    Args:
+        bench: the recording.
+        selection: what was found.
+        weak: positions among the effects that were added.
+
+    Returns:
+        The selection that is left.
+    """
+    fit = selection.final.fit
+    first = len(fit.effects) - selection.added
+    kept = [e for k, e in enumerate(fit.effects) if k - first not in weak]
+    now = settle_again(bench, bench.refine(kept, selection.final.noise, start=fit.parameters, only=len(bench.effects)))
+    return replace(
+        selection,
+        final=settle_again(bench, now.fit),
+        added=selection.added - len(weak),
+        p_values=tuple(p for k, p in enumerate(selection.p_values) if k not in weak),
+        candidates=tuple(scan(bench, now.fit, now.noise)),
+    )
