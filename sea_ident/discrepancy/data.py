@@ -35,6 +35,9 @@ SLOWEST = 0.02
 """Samples slower than this share of the rms speed are left out of the equation of a motor."""
 
 
+UNCERTAIN_SIGN = 2.0
+"""Samples slower than this many times their scatter from period to period are left out too: a mean of signs is none."""
+
 ALIKE = 0.1
 """Combinations of samples left out that are weaker than this within the band are not freed."""
 
@@ -203,12 +206,14 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         channels=processed.channels,
         equations=equations_of(robot),
         harmonics=harmonics,
-        left_out=around_reversals(processed.motion, equations_of(robot)),
+        left_out=around_reversals(processed.motion, equations_of(robot), processed.period_motions),
         warnings=processed.warnings,
     )
 
 
-def around_reversals(motion: Motion, equations: tuple[Equation, ...]) -> NDArray[np.bool_]:
+def around_reversals(
+    motion: Motion, equations: tuple[Equation, ...], periods: tuple[Motion, ...] = ()
+) -> NDArray[np.bool_]:
     """(N, E) whether a motor (in its own equation a link) is about to reverse.
 
     There a sample falls on one or the other side of a jump (of friction, of the efficiency of the gear) by a velocity
@@ -217,7 +222,12 @@ def around_reversals(motion: Motion, equations: tuple[Equation, ...]) -> NDArray
     left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):
         of_link = equation.kind is EquationKind.LINK
-        left_out[:, e] = around_reversal((motion.dq if of_link else motion.dtheta)[:, equation.index])
+        kind = "dq" if of_link else "dtheta"
+        speed = getattr(motion, kind)[:, equation.index]
+        left_out[:, e] = around_reversal(speed)
+        if len(periods) > 1:
+            spread = np.std([getattr(period, kind)[:, equation.index] for period in periods], axis=0, ddof=1)
+            left_out[:, e] |= np.abs(speed) < UNCERTAIN_SIGN * spread
     return left_out
 
 

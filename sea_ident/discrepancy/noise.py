@@ -12,6 +12,9 @@ ComplexArray = NDArray[np.complex128]
 SMALLEST_HALF_WIDTH = 4
 """Noise is smoothed over at least this many harmonics to either side."""
 
+FEWEST_STEPS = 4
+"""Pairs of steps between periods from which on the spread of their energy is estimated."""
+
 SMALLEST_REST = 0.1
 """A residual of which a model takes up more than all but this share says nothing about noise."""
 
@@ -80,7 +83,7 @@ def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = No
     products[1:] /= 2.0
     products[0] = products[0].real
     # variance of a mean of squared successive differences, as degrees of freedom
-    each = 2.0 * (periods - 1) ** 2 / (3.0 * periods - 4.0) if periods > 2 else 1.0
+    each = step_freedom(periods)
     half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * count / each - 1.0) / 2.0)))
     half = min(half, max((harmonics - 1) // 2, 1))
     smooth = _moving_mean(products, half)
@@ -101,6 +104,26 @@ def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = No
         freedom=each * (2 * half + 1) * left,
         total_freedom=each * 2.0 * harmonics * left,
     )
+
+
+def step_freedom(periods: int) -> float:
+    """Degrees of freedom of a variance from the mean square of successive differences of this many periods."""
+    return 2.0 * (periods - 1) ** 2 / (3.0 * periods - 4.0) if periods > 2 else 1.0
+
+
+def noise_directions(periods: FloatArray) -> float:
+    """Number of directions that the scatter of periods (P, M) fills evenly.
+
+    Friction that differs from pass to pass fills a few directions only. The number is the squared trace of the noise
+    covariance over the trace of its square (Satterthwaite); the second follows from products of different steps
+    between periods, which share no noise (as in Chen and Qin, Annals of Statistics 38, 2010).
+    """
+    steps = np.diff(periods, axis=0) / np.sqrt(2.0)
+    gram = steps @ steps.T
+    apart = gram[np.triu_indices(len(steps), 2)]
+    if len(apart) < FEWEST_STEPS:
+        return float(periods.shape[1])
+    return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2)), 1e-300))
 
 
 def unstacked(values: FloatArray, equations: int) -> ComplexArray:

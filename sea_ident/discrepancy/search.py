@@ -9,7 +9,7 @@ from scipy import stats
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, whiten
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
-from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.noise import NoiseFloor, step_freedom
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
@@ -48,7 +48,7 @@ LARGE_TORQUE = 0.3
 CANCELLED = 0.02
 """... with more than this share of it not taken up by other parameters."""
 
-SCATTER_LEVEL = 1e-4
+SCATTER_LEVEL = 1e-5
 """Probability that an effect must not exceed by the scatter of the periods along its own columns."""
 
 EXCUSED = 0.02
@@ -343,8 +343,7 @@ def scatter_p(periods: FloatArray, change: FloatArray) -> float:
         return 0.0
     along = periods @ change / np.linalg.norm(change)
     spread = float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / count))
-    freedom = 2.0 * (count - 1) ** 2 / (3.0 * count - 4.0)
-    return 2.0 * float(stats.t.sf(float(np.linalg.norm(change)) / max(spread, 1e-300), freedom))
+    return 2.0 * float(stats.t.sf(float(np.linalg.norm(change)) / max(spread, 1e-300), step_freedom(count)))
 
 
 def at_a_bound(effect: Effect) -> bool:

@@ -7,7 +7,7 @@ from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit, whiten
-from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
 from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.exceptions import EffectError
@@ -259,7 +259,8 @@ def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
     along = profile @ flat / np.linalg.norm(profile)
     dof = max(int(np.count_nonzero(np.abs(along) > 0.0)), 1)
     ratio = float(along @ along) / dof
-    return float(stats.f.sf(ratio, dof, max(noise.total_freedom * noise.equations, 4.0)))
+    directions = min(noise_directions(flat), float(dof))
+    return float(stats.f.sf(ratio, directions, directions * step_freedom(len(flat))))
 
 
 def _change(bench: Bench, flat: FloatArray, direction: _Direction, periods: int) -> float:

@@ -93,7 +93,7 @@ def differentiate_periods(
 
     The mean is a Fourier series. What a period differs by from it is not periodic: a series fitted to it alone would
     jump at both of its ends, and its derivatives with it. So the differences are laid end to end, over the whole
-    recording, and a line takes up what they differ by between its ends.
+    recording.
 
     Args:
         stack: (P, N, n) positions of consecutive periods.
@@ -107,11 +107,13 @@ def differentiate_periods(
     centre = stack.mean(axis=0)
     means = differentiate(centre, period, harmonics)
     rest = (stack - centre).reshape(periods * samples, joints)
-    slope = (rest[-1] - rest[0]) / max(len(rest) - 1, 1)
-    line = np.outer(np.arange(len(rest)) - 0.5 * (len(rest) - 1), slope)
-    parts = list(
-        differentiate(rest - line, periods * period, int((min(harmonics, (samples - 1) // 2) + 0.5) * periods))
-    )
-    parts[0] = parts[0] + line
-    parts[1] = parts[1] + slope * samples / period
-    return tuple(mean + part.reshape(stack.shape) for mean, part in zip(means, parts, strict=True))  # type: ignore[return-value]
+    # mirrored about both of its ends and faded out, so that neither it nor its slope jumps where the series closes
+    reach = min(samples, len(rest) - 1)
+    fade = 0.5 * (1.0 + np.cos(np.pi * (np.arange(reach) + 1.0) / (reach + 1.0)))[:, None]
+    before = (2.0 * rest[0] - rest[reach:0:-1]) * fade[::-1]
+    after = (2.0 * rest[-1] - rest[-2 : -reach - 2 : -1]) * fade
+    long = np.concatenate([before, rest, after])
+    length = len(long) * period / samples
+    parts = differentiate(long, length, int((min(harmonics, (samples - 1) // 2) + 0.5) * length / period))
+    inside = slice(reach, reach + len(rest))
+    return tuple(mean + part[inside].reshape(stack.shape) for mean, part in zip(means, parts, strict=True))  # type: ignore[return-value]
