@@ -223,8 +223,8 @@ def _conclude(
     remainder = remainder_share(bench, final) if left_p < LACK_LEVEL else 0.0
     missing = [*_missing(bench, selection, alternatives, held), *(_missing_trend(bench, t) for t in trends.trends)]
     # what drifts differs from its first value in the mean too
-    drifting = {(t.effect.name.removesuffix("_drift"), t.effect.joint) for t in trends.trends}
-    missing = [m for m in missing if (m.effect, m.joint) not in drifting]
+    drifting = {(t.effect.name, t.effect.joint) for t in trends.trends}
+    missing = [m for m in missing if (f"{m.effect}_drift", m.joint) not in drifting]
     if change is not None:
         missing.extend(change.missing)
     missing.sort(key=lambda m: -m.torque_share)

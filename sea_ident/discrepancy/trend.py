@@ -128,7 +128,11 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
         best, p_value = _most_likely(left, directions, gains, tests, noise)
         if p_value > LEVEL or _change(bench, left, directions[best], periods) < SMALLEST_CHANGE:
             break
-        named.append((directions[best], gains[best], p_value))
+        chosen = directions[best]
+        named.append((chosen, gains[best], p_value))
+        directions = [
+            d for d in directions if (d.effect.name, d.effect.joint) != (chosen.effect.name, chosen.effect.joint)
+        ]
         left = flat - _explained(flat, [d for d, _, _ in named])
     column_p = min((p for _, _, p in named), default=1.0)
     if not named and directions:
@@ -214,8 +218,14 @@ def _most_likely(
 ) -> tuple[int, float]:
     """Of the trends that explain about as much as the best, the one that the scatter of the periods speaks for most."""
     close = [k for k, gain in enumerate(gains) if gain >= max(gains) - EQUALLY_GOOD]
+    # directions of one effect at one joint are much alike; those of others are tests of their own
+    families = len({(d.effect.name, d.effect.joint) for d in directions})
     p_values = [
-        max(_p_value(gains[k], len(directions[k].used), tests, noise), _scatter_p(flat, directions[k])) for k in close
+        min(
+            1.0,
+            max(_p_value(gains[k], len(directions[k].used), tests, noise), families * _scatter_p(flat, directions[k])),
+        )
+        for k in close
     ]
     best = int(np.argmin(p_values))
     return close[best], p_values[best]

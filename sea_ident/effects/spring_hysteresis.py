@@ -44,7 +44,7 @@ class SpringHysteresis(MemoryEffect):
 
     def variants(self, state: State) -> tuple["SpringHysteresis", ...]:
         """Widths within the deflections of this motion."""
-        return tuple(replace(self, slip=width) for width in deflections(state, self.required_joint, 12))
+        return tuple(replace(self, slip=width) for width in deflections(state, self.required_joint, 40))
 
     def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Theta - q."""

@@ -74,7 +74,9 @@ def without_effects(names: list[str]) -> Iterator[None]:
     def fewer() -> dict[str, type]:
         return less
 
-    places = [m for m in list(sys.modules.values()) if getattr(m, "effect_classes", None) is effect_classes]
+    # a module may be known by two names
+    known = {id(m): m for m in list(sys.modules.values())}
+    places = [m for m in known.values() if getattr(m, "effect_classes", None) is effect_classes]
     patches = [patch.object(module, "effect_classes", fewer) for module in places]
     assert effects_package in places
     for p in patches:
