@@ -2,10 +2,10 @@
 
 from sea_ident.discrepancy.close import ClosedGap, close_gap
 from sea_ident.discrepancy.diagnose import diagnose
-from sea_ident.discrepancy.diagnosis import (
+from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
+from sea_ident.discrepancy.findings import (
     Alternative,
     Detectability,
-    Diagnosis,
     Gap,
     LackOfFit,
     Location,
@@ -14,7 +14,6 @@ from sea_ident.discrepancy.diagnosis import (
     NextExperiment,
     Verdict,
     Waveforms,
-    read_diagnosis,
 )
 
 __all__ = [

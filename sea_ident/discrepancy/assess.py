@@ -7,21 +7,15 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
-from sea_ident.discrepancy.diagnosis import Alternative, Detectability
-from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.search import (
-    FAMILY_LEVEL,
-    Selection,
-    Settled,
-    of_every_kind,
-    penalty,
-    physical,
-    refitted,
-    significance,
-)
+from sea_ident.discrepancy.findings import Alternative, Detectability
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import penalty, physical, significance
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
+from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 

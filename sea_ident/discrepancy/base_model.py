@@ -11,7 +11,9 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import candidate_effects, scan
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, Settled, physical, settle, significance
+from sea_ident.discrepancy.judge import physical, significance
+from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection
+from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import Effect
 
 BASIC = ("coulomb_friction", "viscous_friction", "torque_offset")

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.effects import Effect, Side, effect_classes
 from sea_ident.effects.drift import TrendEffect

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.diagnose import diagnose
-from sea_ident.discrepancy.diagnosis import Diagnosis, Gap, Verdict
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Gap, Verdict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording

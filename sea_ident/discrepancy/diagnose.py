@@ -9,29 +9,25 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
-from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.data import PeriodData, period_data, waveform, wide_processing
-from sea_ident.discrepancy.diagnosis import (
-    Alternative,
-    Diagnosis,
-    LackOfFit,
-    MissingEffect,
-    MissingParameter,
-    Verdict,
-    Waveforms,
-)
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, MissingParameter, Verdict, Waveforms
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import HeldOut, held_out
+from sea_ident.discrepancy.judge import own_torque
 from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import Selection, own_torque, search, settle, without
+from sea_ident.discrepancy.search import Selection, search, without
+from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import Trend, TrendTest, compare_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.diagnosis import Gap
+from sea_ident.discrepancy.findings import Gap
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion

@@ -3,8 +3,9 @@
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Fit
-from sea_ident.discrepancy.diagnosis import Gap
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.findings import Gap
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
 
 

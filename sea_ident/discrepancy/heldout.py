@@ -4,10 +4,12 @@ import warnings as python_warnings
 from dataclasses import dataclass, replace
 
 from sea_ident.discrepancy import assess, check
-from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, period_data, wide_processing
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.search import Selection, Settled, settle_again
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording

@@ -5,8 +5,9 @@ from scipy import stats
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.gap import excess_power
+from sea_ident.discrepancy.judge import flat_periods
 from sea_ident.discrepancy.noise import noise_directions, step_freedom
-from sea_ident.discrepancy.search import Settled, flat_periods
+from sea_ident.discrepancy.settle import Settled
 
 
 def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:

@@ -4,9 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Fit
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import EquationKind, waveform
-from sea_ident.discrepancy.diagnosis import Location
+from sea_ident.discrepancy.findings import Location
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
 
 SIGNIFICANT = 5.0

@@ -16,9 +16,13 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess
-from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, solve, whiten
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, around_reversals
-from sea_ident.discrepancy.diagnosis import Alternative, Diagnosis, NextExperiment
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Alternative, NextExperiment
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import free_shapes, is_signal
+from sea_ident.discrepancy.linear import solve, whiten
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.search import Selection
 from sea_ident.effects import Effect, Side

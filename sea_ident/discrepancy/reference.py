@@ -6,8 +6,9 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Fit
-from sea_ident.discrepancy.diagnosis import Alternative, MissingEffect, MissingParameter
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import make_effect
 from sea_ident.estimation import Model

@@ -2,7 +2,7 @@
 
 import warnings as python_warnings
 
-from sea_ident.discrepancy.bench import Fit
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Side, spring_effects
 from sea_ident.estimation import Model, identify
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning

@@ -4,12 +4,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
 
-from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Fit, free_shapes, is_signal, whiten
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
-from sea_ident.discrepancy.noise import NoiseFloor, step_freedom
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.judge import (
+    at_a_bound,
+    flat_periods,
+    own_torque,
+    penalty,
+    physical,
+    scatter_p,
+    significance,
+    torque_change,
+)
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
@@ -29,19 +40,6 @@ SMALLEST_SHARE = 1e-3
 BESIDE_ANOTHER = 0.12
 """And by this share of what the largest effect beside it does: the form of that one is never known better."""
 
-LARGEST_TIMES_TORQUE = 1.5
-"""No effect is larger than this many times the torque of the motor (rms)."""
-
-FAR = 3.0
-"""Statistic over degrees of freedom beyond which the shapes of the model are left alone, for they would bend to the
-misfit, ..."""
-
-BENT = 0.7
-"""... unless that leaves less than this share of the excess: then they were what is wrong, ..."""
-
-COMMON = 2.5
-"""... or they change by less than this factor: as much as one motor may differ from another."""
-
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
 
@@ -50,9 +48,6 @@ CANCELLED = 0.02
 
 SCATTER_LEVEL = 1e-5
 """Probability that an effect must not exceed by the scatter of the periods along its own columns."""
-
-EXCUSED = 0.02
-"""Share of the power of an effect that may be in a column of the wrong sign."""
 
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
@@ -101,63 +96,6 @@ class Selection:
         """The effects added."""
         effects = self.final.fit.effects
         return effects[len(effects) - self.added :] if self.added else ()
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """A model fitted in a noise floor that belongs to it.
-
-    Attributes:
-        fit: the fit.
-        noise: the floor that it was fitted in.
-    """
-
-    fit: Fit
-    noise: NoiseFloor
-
-
-def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
-    """Fit a model and find its noise floor in turn, from nothing."""
-    fit = bench.first_fit if tuple(effects) == bench.effects else bench.fit(effects, None, tangents=False)
-    settled = Settled(fit, bench.noise(fit))
-    for _ in range(rounds):
-        settled = settle_again(bench, settled.fit)
-    return settled
-
-
-def settle_again(bench: Bench, fit: Fit) -> Settled:
-    """Noise floor of a fit, and the fit refined in it."""
-    noise = bench.noise(fit)
-    anchored = bench.anchored(fit.effects, fit.parameters)
-    bench.release(anchored)
-    bent = bench.refine(anchored, noise, start=fit.parameters)
-    if bent.statistic > FAR * bent.dof:
-        straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
-        if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
-            return Settled(straight, noise)
-    return Settled(bent, noise)
-
-
-def far_from(effects: Sequence[Effect], usual: Sequence[Effect]) -> bool:
-    """Whether a shape of the first effects of a model is further from the usual one than shapes commonly are."""
-    for one, other in zip(effects, usual, strict=False):
-        for shape in one.shapes:
-            pair = float(getattr(one, shape.name)), float(getattr(other, shape.name))
-            if shape.logarithmic and not 1.0 / COMMON < pair[0] / pair[1] < COMMON:
-                return True
-    return False
-
-
-def significance(gain: float, columns: int, tests: int, fit: Fit, noise: NoiseFloor) -> float:
-    """Probability of such a drop of the statistic by chance, for the best of `tests` candidates.
-
-    The noise floor is itself an estimate, so the drop follows an F rather than a chi-square distribution. Where the
-    model leaves an excess, the drop is measured in units of it.
-    """
-    scale = max(fit.statistic - gain, 1.0) / max(fit.dof - columns, 1)
-    ratio = gain / columns / max(scale, 1.0)
-    single = float(stats.f.sf(ratio, columns, max(noise.total_freedom, 4.0)))
-    return min(1.0, tests * single)
 
 
 def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
@@ -301,99 +239,6 @@ def of_every_kind(candidates: Sequence[Candidate], count: int) -> list[Candidate
 def kind_of(effect: Effect) -> str:
     """What an effect acts on: a side of the model, or which part of the chain of signals."""
     return effect.name if is_signal(effect) else str(effect.side)
-
-
-def own_torque(bench: Bench, fit: Fit, position: int) -> float:
-    """Largest rms of the torque of an effect in an equation, as a share of the rms torque of the motor there [-]."""
-    position %= len(fit.effects)
-    effect = fit.effects[position]
-    if is_signal(effect):
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        with_it, without = (bench.predicted(model, fit.parameters).residual for model in (fit.effects, others))
-        torque = without - with_it
-    else:
-        own = np.array([fit.parameters[c.name] for c in effect.columns(bench.robot)])
-        torque = bench.column_spectra(effect, fit.effects) @ own
-    rms = np.sqrt(np.sum(np.abs(torque) ** 2, axis=0))
-    return float(np.max(rms / np.maximum(bench.torque_rms, 1e-300)))
-
-
-def flat_periods(bench: Bench, now: Settled) -> FloatArray:
-    """(P, M) whitened residuals of the periods, in units of the noise of their mean."""
-    whitener, free = bench.whitener(now.noise), bench.free_basis(now.noise)
-    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(now.fit)])
-    return flat - (flat @ free) @ free.T
-
-
-def scatter_p(periods: FloatArray, change: FloatArray) -> float:
-    """Probability of a change of the mean by the scatter of the periods along that very change.
-
-    Noise that gathers where the change is large (friction that differs from pass to pass) is larger there than the
-    noise floor, which is one for all phases of a period, says.
-
-    Args:
-        periods: (P, M) whitened residuals of the periods.
-        change: (M,) change of the whitened mean residual.
-
-    Returns:
-        Probability by Student's t; 0 where there are too few periods to tell.
-    """
-    count = len(periods)
-    if count < 4:
-        return 0.0
-    along = periods @ change / np.linalg.norm(change)
-    spread = float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / count))
-    return 2.0 * float(stats.t.sf(float(np.linalg.norm(change)) / max(spread, 1e-300), step_freedom(count)))
-
-
-def at_a_bound(effect: Effect) -> bool:
-    """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else."""
-    for shape in effect.shapes:
-        if shape.logarithmic and shape.name not in ("smoothing", "order", "time_constant"):
-            value = float(getattr(effect, shape.name))
-            if value < 1.02 * shape.lower or value > 0.98 * shape.upper:
-                return True
-    return False
-
-
-def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
-    """Largest change of the residual of any equation, as a share of the rms torque that it is about [-]."""
-    change = np.sqrt(np.sum(np.abs(after.residual - before.residual) ** 2, axis=0))
-    return float(np.max(change / np.maximum(bench.torque_rms, 1e-300)))
-
-
-def penalty(effect: Effect, bench: Bench) -> float:
-    """Price of the parameters of an effect in units of the statistic, so that the simpler of two equals wins."""
-    count = len(effect.columns(bench.robot)) + len(free_shapes((effect,)))
-    return count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
-
-
-def physical(bench: Bench, fit: Fit, position: int) -> bool:
-    """Whether an effect of a model is possible.
-
-    A column that must not be negative is not, but for what its uncertainty or a small share of the effect excuses; and
-    the effect is not larger than all the torque there is, which only two effects that cancel each other could be.
-    """
-    position %= len(fit.effects)
-    effect = fit.effects[position]
-    counts = bench.counts(fit.effects)
-    start = sum(counts[:position])
-    columns = effect.columns(bench.robot)
-    if not columns:
-        return True
-    values = fit.values[start : start + len(columns)]
-    if not effect.plausible(values, fit.parameters):
-        return False
-    spectra = bench.column_spectra(effect, fit.effects)
-    power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))
-    total = np.sqrt(np.sum(np.abs(spectra @ values) ** 2, axis=0))
-    if np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms):
-        return False
-    for k, column in enumerate(columns):
-        wrong = column.nonnegative and values[k] < -2.0 * fit.std(start + k)
-        if wrong and power[k] > EXCUSED * float(power.sum()):
-            return False
-    return True
 
 
 def _exchange(bench: Bench, now: Settled, added: int) -> Settled:

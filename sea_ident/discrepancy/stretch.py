@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, around_reversals, equations_of, harmonics_for, waveform
-from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.effects import Effect
 from sea_ident.processing import ProcessedRecording
 from sea_ident.robot import Robot

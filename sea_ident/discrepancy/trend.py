@@ -6,8 +6,10 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, ComplexArray, Fit, whiten
-from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.linear import whiten
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_directions, step_freedom
 from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.exceptions import EffectError

@@ -16,11 +16,10 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, circular
 from sea_ident.discrepancy.base_model import completed
-from sea_ident.discrepancy.bench import Fit
 from sea_ident.discrepancy.candidates import Candidate, candidate_effects, scan
-from sea_ident.discrepancy.diagnosis import (
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import (
     Alternative,
-    Diagnosis,
     Gap,
     LackOfFit,
     Location,
@@ -28,18 +27,12 @@ from sea_ident.discrepancy.diagnosis import (
     MissingParameter,
     Verdict,
 )
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import (
-    FAMILY_LEVEL,
-    Settled,
-    at_a_bound,
-    own_torque,
-    physical,
-    settle,
-    settle_again,
-    significance,
-)
+from sea_ident.discrepancy.search import FAMILY_LEVEL
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
 from sea_ident.effects import Effect, make_effect, spring_effects
 from sea_ident.estimation import Model

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sea_ident.discrepancy.diagnosis import Gap, MissingEffect, Verdict
+from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.trend import TrendTest
 

@@ -10,7 +10,7 @@ import sea_ident
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.diagnose import _verdict
-from sea_ident.discrepancy.diagnosis import Alternative, MissingEffect
+from sea_ident.discrepancy.findings import Alternative, MissingEffect
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.diagnosis import (
+from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
+from sea_ident.discrepancy.findings import (
     Alternative,
     Detectability,
-    Diagnosis,
     Gap,
     LackOfFit,
     Location,
@@ -20,7 +20,6 @@ from sea_ident.discrepancy.diagnosis import (
     NextExperiment,
     Verdict,
     Waveforms,
-    read_diagnosis,
 )
 from sea_ident.report import write_report
 from sea_ident.report.bars import bars

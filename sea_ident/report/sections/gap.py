@@ -2,7 +2,8 @@
 
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, Gap
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Gap
 from sea_ident.report.bars import bars, bars_legend
 from sea_ident.report.chart import Band, Chart, Line
 from sea_ident.report.section import DiagnosisSection

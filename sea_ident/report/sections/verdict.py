@@ -2,7 +2,8 @@
 
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, Verdict
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Verdict
 from sea_ident.report.section import DiagnosisSection
 
 MEANING = {

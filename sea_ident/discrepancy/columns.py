@@ -1,0 +1,104 @@
+"""Columns of effects on one recording, as spectra; what was computed once is kept."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sea_ident._typing import IntArray
+from sea_ident.discrepancy.data import PeriodData, spectrum
+from sea_ident.discrepancy.free_shapes import signal_effects
+from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.effects import Anchor, Column, Contribution, Effect, State, corrected_motion
+
+VARIANTS_KEPT = 3e8
+"""Bytes of columns of candidates that are kept for the next search."""
+
+
+class Columns:
+    """Evaluates effects on one recording.
+
+    Args:
+        data: the recording.
+    """
+
+    def __init__(self, data: PeriodData) -> None:
+        self.data = data
+        self.robot = data.robot
+        self._states: dict[tuple[Effect, ...], State] = {}
+        self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
+        self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
+
+    def state(self, effects: Sequence[Effect]) -> State:
+        """Robot and mean motion, with the errors of the sensors taken out that the effects describe."""
+        signals = signal_effects(effects)
+        if signals not in self._states:
+            if len(self._states) > 12:
+                self._states.pop(next(k for k in self._states if k))
+            motion = corrected_motion(self.robot, signals, self.data.motion)
+            self._states[signals] = State(self.robot, motion, self.data.channels)
+        return self._states[signals]
+
+    def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, k) columns of one effect within a model."""
+        signals = signal_effects(effects)
+        key = (effect, signals)
+        if key not in self._columns:
+            if len(self._columns) > 400:
+                self._columns.clear()
+            self._columns[key] = self._spectra(effect.evaluate(self.state(effects)), signals)
+        return self._columns[key]
+
+    def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
+        """Columns of one effect in all its variants.
+
+        Returns:
+            (e,) equations that it touches, and (H + 1, e, v, k) columns in these.
+        """
+        signals = signal_effects(effects)
+        key = (tuple(variants), signals)
+        if key not in self._variants:
+            if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
+                self._variants.clear()
+            state = self.state(effects)
+            parts = [variant.evaluate(state) for variant in variants]
+            both = Contribution(np.stack([p.link for p in parts], 2), np.stack([p.motor for p in parts], 2))
+            self._variants[key] = self._touched(both, signals)
+        return self._variants[key]
+
+    def _touched(self, part: Contribution, signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
+        """Equations with anything in them, and the spectra (H + 1, e, ...) there."""
+        for signal in signals:
+            part = signal.shifted(self.robot, self.data.motion.time, part)
+        rows = self.data.rows(part)
+        touched = np.array([e for e in range(rows.shape[1]) if np.any(rows[:, e])], dtype=np.intp)
+        return touched, spectrum(rows[:, touched], self.data.harmonics)
+
+    def spectra_of(self, part: Contribution, effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, ...) of link and motor rows (N, n, ...) within a model."""
+        return self._spectra(part, signal_effects(effects))
+
+    def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
+        touched, found = self._touched(part, signals)
+        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), *found.shape[2:]), dtype=np.complex128)
+        out[:, touched] = found
+        return out
+
+    def design(self, effects: Sequence[Effect]) -> ComplexArray:
+        """(H + 1, E, p) columns of a model."""
+        return np.concatenate([self.column_spectra(effect, effects) for effect in effects], axis=2)
+
+    def labels(self, effects: Sequence[Effect]) -> tuple[Column, ...]:
+        """(p,) labels of the columns of a model."""
+        return tuple(column for effect in effects for column in effect.columns(self.robot))
+
+    def counts(self, effects: Sequence[Effect]) -> list[int]:
+        """Number of columns of every effect."""
+        return [len(effect.columns(self.robot)) for effect in effects]
+
+    def anchored(self, effects: Sequence[Effect], parameters: dict[str, float] | None) -> tuple[Effect, ...]:
+        """The same effects, knowing what they need of the rest of the model."""
+        effects = tuple(effects)
+        if parameters is None:
+            return effects
+        anchor = Anchor(self.robot, effects, parameters)
+        return tuple(effect.anchored(anchor) for effect in effects)

@@ -1,0 +1,223 @@
+"""The parts of a diagnosis."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.effects import Effect
+
+
+class Verdict(StrEnum):
+    """The outcome in a word."""
+
+    NONE = "none"
+    NAMED = "named"
+    NAMED_WITH_REMAINDER = "named_with_remainder"
+    AMBIGUOUS = "ambiguous"
+    SUSPECT = "suspect"
+    NOT_IN_LIBRARY = "not_in_library"
+    ONLY_AGAINST_REFERENCE = "only_against_reference"
+    CANNOT_TELL = "cannot_tell"
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """Whether the model leaves more than noise.
+
+    Attributes:
+        statistic: weighted sum of squares of the mean residual.
+        dof: its degrees of freedom.
+        p_value: probability of as much by noise alone.
+        trend_p_value: the same for a trend over the periods.
+        per_joint: statistic over degrees of freedom by joint and equation, 1 for noise alone.
+        remainder: share of the torque that the noise floor had to be raised by for the final model [-].
+    """
+
+    statistic: float
+    dof: int
+    p_value: float
+    trend_p_value: float
+    per_joint: Mapping[str, Mapping[str, float]]
+    remainder: float = 0.0
+
+
+@dataclass(frozen=True)
+class Location:
+    """A part of the motion in which model and data disagree.
+
+    Attributes:
+        joint: the joint.
+        equation: motor, link, sum, or spring where both change with opposite signs.
+        regime: which samples.
+        excess_rms: rms beyond the noise [N m].
+        z: how many standard deviations of the noise.
+    """
+
+    joint: str
+    equation: str
+    regime: str
+    excess_rms: float
+    z: float
+
+
+@dataclass(frozen=True)
+class MissingParameter:
+    """A parameter of an effect that is missing.
+
+    Attributes:
+        name: name.
+        value: value.
+        std: standard deviation.
+        unit: unit.
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What an effect could be taken for.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        cos2: share of the effect that it would explain as well [-].
+        fit: the whole model with it in the place of the effect, where that was fitted; not written to files.
+    """
+
+    effect: str
+    joint: str | None
+    cos2: float
+    fit: Fit | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class MissingEffect:
+    """An effect that the model lacks.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        parameters: columns and shapes.
+        torque_share: rms of its torque over that of the motor [-].
+        p_value: probability of finding as much where nothing is missing.
+        alternatives: effects that explain the data as well.
+        transfer: share of what it explains on the held-out data that it explains with its parameters as they are;
+            None where that was not tested.
+        detail: the effect itself, with its shape.
+        values: values of its columns.
+    """
+
+    effect: str
+    joint: str | None
+    parameters: tuple[MissingParameter, ...]
+    torque_share: float
+    p_value: float
+    alternatives: tuple[Alternative, ...]
+    transfer: float | None = None
+    detail: Effect | None = None
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Rms beyond the noise per joint [N m].
+
+    Attributes:
+        before: of the model as it was, refitted.
+        after: of the model with the effects.
+        noise: rms of the noise of the mean.
+    """
+
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    noise: Mapping[str, float]
+
+    @property
+    def shrink(self) -> float:
+        """1 - after / before over all joints; 0 where there was none."""
+        before, after = (float(np.linalg.norm(list(part.values()))) for part in (self.before, self.after))
+        return 1.0 - after / before if before > 0.0 else 0.0
+
+    def summary(self) -> str:
+        """Before, after and noise per joint."""
+        parts = []
+        for joint, before in self.before.items():
+            after, noise = self.after[joint], self.noise[joint]
+            change = "within the noise" if before == after == 0.0 else f"{before:.3g} -> {after:.3g}"
+            parts.append(f"{joint} {change} (noise {noise:.2g})")
+        shrink = f"; shrink {self.shrink:.2f}" if any(value > 0.0 for value in self.before.values()) else ""
+        return f"{', '.join(parts)}{shrink}"
+
+
+@dataclass(frozen=True)
+class Detectability:
+    """What could have been seen of an effect.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        smallest: smallest value that would be found 19 times out of 20.
+        unit: its unit.
+        absorbed: share of the effect that the other parameters absorb [-].
+        confusable_with: effects (`name` or `name at joint`) that look like it in this motion.
+    """
+
+    effect: str
+    joint: str | None
+    smallest: float
+    unit: str
+    absorbed: float
+    confusable_with: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class NextExperiment:
+    """An experiment that tells two effects apart.
+
+    Attributes:
+        separates: the two, as `name at joint`.
+        excitation: what `Excitation.to_dict` gives.
+        gain: how much more of one lies outside the span of the other than in the present motion [-].
+    """
+
+    separates: tuple[str, str]
+    excitation: Mapping[str, Any]
+    gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class Waveforms:
+    """Mean residuals over a period, for pictures.
+
+    Attributes:
+        time: (N,) [s].
+        equations: (E,) labels `joint motor`, `joint link`, `joint sum`.
+        before: (N, E) residual of the refitted model [N m].
+        after: (N, E) residual with the effects [N m].
+        noise: (E,) rms of the noise [N m].
+        q: (N, n) link positions [rad].
+        dtheta: (N, n) motor velocities [rad/s].
+        deflection: (N, n) [rad].
+        explained: (N, E) torque of each missing effect, by its label [N m].
+        bands: (N, E) standard deviation of that torque, from the uncertainty of parameters and shapes [N m].
+    """
+
+    time: FloatArray
+    equations: tuple[str, ...]
+    before: FloatArray
+    after: FloatArray
+    noise: FloatArray
+    q: FloatArray
+    dtheta: FloatArray
+    deflection: FloatArray
+    explained: Mapping[str, FloatArray] = field(default_factory=dict)
+    bands: Mapping[str, FloatArray] = field(default_factory=dict)

@@ -1,0 +1,69 @@
+"""A model fitted to a recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.effects import Column, Effect, Shape
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model fitted to the mean residual, everything free.
+
+    Attributes:
+        effects: the model, with its shapes.
+        columns: (p,) labels.
+        values: (p,) parameters; where the data tell only combinations, as near to the priors as they let.
+        residual: (H + 1, E) complex residual of the mean [N m].
+        scale: (E,) factor of the residual before it is whitened [-].
+        whitened: (M,) whitened residual.
+        basis: (M, r) orthonormal basis of everything that is free: columns, and tangents of the shapes.
+        directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
+        covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
+        free_shapes: (s,) which shapes are free: index of the effect, and the shape.
+    """
+
+    effects: tuple[Effect, ...]
+    columns: tuple[Column, ...]
+    values: FloatArray
+    residual: ComplexArray
+    scale: FloatArray
+    whitened: FloatArray
+    basis: FloatArray
+    directions: ComplexArray
+    covariance_factor: FloatArray
+    free_shapes: tuple[tuple[int, Shape], ...]
+
+    @property
+    def statistic(self) -> float:
+        """Weighted sum of squared residuals."""
+        return float(self.whitened @ self.whitened)
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the statistic."""
+        return int(len(self.whitened) - self.basis.shape[1])
+
+    @property
+    def excess(self) -> float:
+        """Part of the statistic beyond what noise leaves, at least zero."""
+        return max(self.statistic - self.dof, 0.0)
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """Value of every parameter by name."""
+        return {column.name: float(value) for column, value in zip(self.columns, self.values, strict=True)}
+
+    def std(self, index: int) -> float:
+        """Standard deviation of a parameter (index < p) or a shape (p + position in `free_shapes`)."""
+        return float(np.linalg.norm(self.covariance_factor[index]))
+
+    def slice_of(self, position: int, robot_columns: Sequence[int]) -> slice:
+        """Columns of one effect, given the number of columns of every effect."""
+        start = int(sum(robot_columns[:position]))
+        return slice(start, start + int(robot_columns[position]))

@@ -1,0 +1,39 @@
+"""Nonlinear parameters of a model: which are free, and how they move."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sea_ident.effects import Effect, Shape
+from sea_ident.effects.signal import SignalEffect
+
+SHAPES_THAT_STAY = {"spring_stiffening": ("exponent",), "external_force": ("start", "stop")}
+"""Shape parameters that are not refined: they say which effect it is, or come from elsewhere."""
+
+
+def is_signal(effect: Effect) -> bool:
+    """Whether an effect sits in the chain of signals."""
+    return isinstance(effect, SignalEffect)
+
+
+def signal_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Those effects that sit in the chain of signals."""
+    return tuple(effect for effect in effects if is_signal(effect))
+
+
+def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
+    """Shape parameters that a fit is free to change, and amounts of signal effects."""
+    found: list[tuple[int, Shape]] = []
+    for position, effect in enumerate(effects):
+        stay = SHAPES_THAT_STAY.get(effect.name, ())
+        shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
+        found.extend((position, shape) for shape in shapes if shape.name not in stay)
+    return tuple(found)
+
+
+def moved(effect: Effect, shape: Shape, step: float) -> Effect:
+    """The effect with one shape moved: by a factor exp(step), or by `step` of its range, within its range."""
+    value = float(getattr(effect, shape.name))
+    new = value * np.exp(step) if shape.logarithmic else value + step * (shape.upper - shape.lower)
+    return replace(effect, **{shape.name: float(np.clip(new, shape.lower, shape.upper))})  # type: ignore[arg-type]

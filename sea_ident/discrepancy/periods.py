@@ -1,0 +1,87 @@
+"""The periods of a recording in the light of a model."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.data import PeriodData, spectrum, towards_mean
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import signal_effects
+from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.effects import Contribution, Effect, State, corrected_motion
+
+PERIOD_SAMPLES = 2.5
+"""Samples of a single period that its model torque is computed at, per harmonic compared."""
+
+
+class Periods:
+    """Evaluates models on every period; what was computed once is kept.
+
+    Args:
+        data: the recording.
+    """
+
+    def __init__(self, data: PeriodData) -> None:
+        self.data = data
+        self.robot = data.robot
+        stride = max(1, int(data.samples / (PERIOD_SAMPLES * data.harmonics)))
+        self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
+        self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
+
+    def residuals(self, fit: Fit) -> ComplexArray:
+        """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean.
+
+        They are linearised over distances as small as the error of the mean: the noise of one period would carry a
+        velocity across the turn of friction that the mean, P times better known, stays on one side of.
+        """
+        data = self.data
+        signals = signal_effects(fit.effects)
+        bodies = [e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia")]
+        rest = [e for e in fit.effects if e.name not in ("rigid_bodies", "rotor_inertia")]
+        own = np.concatenate(
+            [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
+        )
+        predicted = []
+        for state, body_rows in self._body_rows(signals, tuple(bodies)):
+            rows = body_rows @ own
+            link = rows[:, : self.robot.n].copy()
+            motor = rows[:, self.robot.n :].copy()
+            for e in rest:
+                values = np.array([fit.parameters[c.name] for c in e.columns(self.robot)])
+                if len(values):
+                    part = e.evaluate(state)
+                    link += part.link @ values
+                    motor += part.motor @ values
+            part = Contribution(link, motor)
+            for signal in signals:
+                part = signal.shifted(self.robot, state.motion.time, part)
+            predicted.append(spectrum(data.rows(part), data.harmonics))
+        changes = (np.stack(predicted[1:]) - predicted[0]) * np.sqrt(data.periods)
+        targets = np.stack([spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor])
+        return np.asarray(fit.scale * (fit.residual + targets - targets.mean(axis=0) - changes), dtype=np.complex128)
+
+    def _body_rows(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> list[tuple[State, FloatArray]]:
+        """State and rows (N', 2 n, k) of bodies and rotors of the mean, then of every period, at fewer samples."""
+        if signals not in self._period_bodies:
+            if len(self._period_bodies) > 3:
+                self._period_bodies.clear()
+            found = []
+            mean, near = towards_mean(self.data.period_motions, 1.0 / np.sqrt(self.data.periods))
+            for motion in (mean, *near):
+                thin = corrected_motion(self.robot, signals, motion)[:: self._stride]
+                state = State(self.robot, thin, _thinned(self.data.channels, self._stride))
+                parts = [body.evaluate(state) for body in bodies]
+                width = 2 * self.robot.n
+                rows = np.concatenate(
+                    [np.concatenate([part.link, part.motor], axis=1) for part in parts]
+                    or [np.zeros((len(thin), width, 0))],
+                    axis=2,
+                )
+                found.append((State(self.robot, thin, state.channels), rows))
+            self._period_bodies[signals] = found
+        return self._period_bodies[signals]
+
+
+def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:
+    return {kind: values[::stride] for kind, values in channels.items()}

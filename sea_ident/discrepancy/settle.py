@@ -1,0 +1,64 @@
+"""A model in the noise floor that belongs to it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.effects import Effect
+
+FAR = 3.0
+"""Statistic over degrees of freedom beyond which the shapes of the model are left alone, for they would bend to the
+misfit, ..."""
+
+BENT = 0.7
+"""... unless that leaves less than this share of the excess: then they were what is wrong, ..."""
+
+COMMON = 2.5
+"""... or they change by less than this factor: as much as one motor may differ from another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A model fitted in a noise floor that belongs to it.
+
+    Attributes:
+        fit: the fit.
+        noise: the floor that it was fitted in.
+    """
+
+    fit: Fit
+    noise: NoiseFloor
+
+
+def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
+    """Fit a model and find its noise floor in turn, from nothing."""
+    fit = bench.first_fit if tuple(effects) == bench.effects else bench.fit(effects, None, tangents=False)
+    settled = Settled(fit, bench.noise(fit))
+    for _ in range(rounds):
+        settled = settle_again(bench, settled.fit)
+    return settled
+
+
+def settle_again(bench: Bench, fit: Fit) -> Settled:
+    """Noise floor of a fit, and the fit refined in it."""
+    noise = bench.noise(fit)
+    anchored = bench.anchored(fit.effects, fit.parameters)
+    bench.release(anchored)
+    bent = bench.refine(anchored, noise, start=fit.parameters)
+    if bent.statistic > FAR * bent.dof:
+        straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
+        if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
+            return Settled(straight, noise)
+    return Settled(bent, noise)
+
+
+def far_from(effects: Sequence[Effect], usual: Sequence[Effect]) -> bool:
+    """Whether a shape of the first effects of a model is further from the usual one than shapes commonly are."""
+    for one, other in zip(effects, usual, strict=False):
+        for shape in one.shapes:
+            pair = float(getattr(one, shape.name)), float(getattr(other, shape.name))
+            if shape.logarithmic and not 1.0 / COMMON < pair[0] / pair[1] < COMMON:
+                return True
+    return False

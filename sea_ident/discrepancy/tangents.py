@@ -1,0 +1,222 @@
+"""How the torque of a model changes with its nonlinear parameters."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.columns import Columns
+from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
+from sea_ident.discrepancy.free_shapes import moved, signal_effects
+from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.effects import Column, Contribution, Effect, JointEffect, Shape, Side, State, corrected_motion
+from sea_ident.effects.load import LoadEffect
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.motion import Motion
+
+
+class Tangents(Columns):
+    """Derivatives with respect to shapes and to amounts of effects in the chain of signals.
+
+    Args:
+        data: the recording.
+    """
+
+    def __init__(self, data: PeriodData) -> None:
+        super().__init__(data)
+        self._derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
+
+    def stiffness_slopes(self, columns: Sequence[Column], design: ComplexArray) -> FloatArray:
+        """(E, p) part of every parameter in the mean slope of the spring torque of a link over its deflection."""
+        out = np.zeros((len(self.data.equations), len(columns)))
+        for e, deflection in self._deflections.items():
+            joint = self.data.equations[e].joint
+            own = [k for k, c in enumerate(columns) if c.joint == joint and c.side is Side.SPRING]
+            power = float(np.sum(np.abs(deflection) ** 2))
+            if own and power > 0.0:
+                out[e, own] = -np.real(deflection.conj() @ design[1:, e, own]) / power
+        return out
+
+    @cached_property
+    def _deflections(self) -> dict[int, ComplexArray]:
+        """(H,) spectrum of the deflection, without its mean, for every link equation."""
+        deflection = spectrum(self.data.motion.deflection, self.data.harmonics)[1:]
+        return {
+            e: deflection[:, equation.index]
+            for e, equation in enumerate(self.data.equations)
+            if equation.kind is EquationKind.LINK
+        }
+
+    def slopes_of(self, change: ComplexArray, equations: Sequence[int]) -> FloatArray:
+        """(E, k) slope over the deflection of a torque (H + 1, E, k) of the springs of some link equations."""
+        out = np.zeros(change.shape[1:])
+        for e in equations:
+            if e in self._deflections:
+                deflection = self._deflections[e]
+                power = float(np.sum(np.abs(deflection) ** 2))
+                if power > 0.0:
+                    out[e] = -np.real(deflection.conj() @ change[1:, e]) / power
+        return out
+
+    def tangents(
+        self,
+        effects: tuple[Effect, ...],
+        columns: tuple[Column, ...],
+        values: FloatArray,
+        shapes: Sequence[tuple[int, Shape]],
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Change with each free shape, in the coordinates of `moved`.
+
+        Returns:
+            (H + 1, E, s) of the model torque, and (E, s) of the stiffness of the springs.
+        """
+        counts = self.counts(effects)
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
+        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), len(shapes)), dtype=np.complex128)
+        slopes = np.zeros(out.shape[1:])
+        parameters = {column.name: float(value) for column, value in zip(columns, values, strict=True)}
+        for k, (position, shape) in enumerate(shapes):
+            effect = effects[position]
+            if isinstance(effect, SignalEffect):
+                torque, slope = self.signal_tangent(effect, shape, effects, parameters)
+                # `moved` counts in ranges of the amount
+                out[:, :, k], slopes[:, k] = ((shape.upper - shape.lower) * part for part in (torque, slope))
+                continue
+            own = values[starts[position] : starts[position + 1]]
+            low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
+            state = self.state(effects)
+            parts = [e.evaluate(state) for e in (low, high)]
+            change = Contribution(
+                (parts[1].link - parts[0].link) @ own / 2e-3, (parts[1].motor - parts[0].motor) @ own / 2e-3
+            )
+            out[:, :, k] = self._spectra(change, signal_effects(effects))
+            if effect.side is Side.SPRING:
+                slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect))[:, 0]
+        return out, slopes
+
+    def links_of(self, effect: Effect) -> list[int]:
+        """Link equations of the joint of an effect."""
+        return [e for e in self._deflections if self.data.equations[e].joint == effect.joint]
+
+    def signal_tangent(
+        self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float]
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Change with the amount of an effect in the chain of signals.
+
+        Bodies and rotors by the analytic derivatives of their torque, all other effects by differences.
+
+        Returns:
+            (H + 1, E) of the model torque, and (E,) of the stiffness of the springs.
+        """
+        signals = signal_effects(effects)
+        step = 1e-4 * (amount.upper - amount.lower)
+        here = float(getattr(effect, amount.name))
+        others = tuple(s for s in signals if s != effect)
+        motions, rows, springs = [], [], []
+        # what stands at another joint does not see this signal
+        rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
+        for sign in (-1.0, 1.0):
+            changed = (*others, replace(effect, **{amount.name: here + sign * step}))  # type: ignore[arg-type]
+            motion = corrected_motion(self.robot, changed, self.data.motion)
+            motions.append(motion)
+            state = State(self.robot, motion, self.data.channels)
+            total, spring = (np.zeros((2, len(motion), self.robot.n)) for _ in range(2))
+            for e in rest:
+                own = np.array([parameters.get(c.name, 0.0) for c in e.columns(self.robot)])
+                if np.any(own):
+                    part = e.evaluate(state)
+                    total += np.stack([part.link @ own, part.motor @ own])
+                    if e.side is Side.SPRING:
+                        spring += np.stack([part.link @ own, part.motor @ own])
+            rows.append(total)
+            springs.append(spring)
+        change = (rows[1] - rows[0]) / (2.0 * step)
+        base = self.state(effects)
+        tangent = self._bodies_tangent(base, motions[0], motions[1], parameters) / (2.0 * step)
+        part = Contribution((change[0] + tangent[0])[:, :, None], (change[1] + tangent[1])[:, :, None])
+        moved_rows = Contribution(np.zeros_like(part.link), np.zeros_like(part.motor))
+        if type(effect).shifted is not Effect.shifted:
+            moved_rows = self._shift_tangent(effect, amount, effects, parameters, step)
+        part = Contribution(part.link + moved_rows.link, part.motor + moved_rows.motor)
+        stiffer = (springs[1] - springs[0])[:, :, :, None] / (2.0 * step)
+        slopes = self.slopes_of(self._spectra(Contribution(stiffer[0], stiffer[1]), ()), self.links_of(effect))
+        return self._spectra(part, signals)[:, :, 0], slopes[:, 0]
+
+    def _shift_tangent(
+        self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float], step: float
+    ) -> Contribution:
+        """Change of the rows (N, n, 1) by an effect that moves the torque in time."""
+        state = self.state(effects)
+        link, motor = (np.zeros((len(state.motion), self.robot.n, 1)) for _ in range(2))
+        for e in effects:
+            own = np.array([parameters.get(c.name, 0.0) for c in e.columns(self.robot)])
+            if len(own) and np.any(own):
+                part = e.evaluate(state)
+                link[:, :, 0] += part.link @ own
+                motor[:, :, 0] += part.motor @ own
+        rows = Contribution(link, motor)
+        ends = [
+            replace(effect, **{amount.name: sign * step}).shifted(self.robot, self.data.motion.time, rows)  # type: ignore[arg-type]
+            for sign in (-1.0, 1.0)
+        ]
+        return Contribution(
+            (ends[1].link - ends[0].link) / (2.0 * step), (ends[1].motor - ends[0].motor) / (2.0 * step)
+        )
+
+    def _bodies_tangent(self, state: State, low: Motion, high: Motion, parameters: dict[str, float]) -> FloatArray:
+        """(2, N, n) change of link and motor rows of bodies and rotors from one motion to another close by."""
+        robot, motion = self.robot, state.motion
+        dx = robot.extended_state(high.q, high.theta) - robot.extended_state(low.q, low.theta)
+        dv = robot.extended_rate(high.dq, high.dtheta) - robot.extended_rate(low.dq, low.dtheta)
+        da = robot.extended_rate(high.ddq, high.ddtheta) - robot.extended_rate(low.ddq, low.ddtheta)
+        touched = np.any(dx) or np.any(dv) or np.any(da)
+        if not touched:
+            return np.zeros((2, len(motion), robot.n))
+        by_position, by_velocity, mass = self._dynamics_derivatives(state, parameters)
+        torque = np.einsum("kij,kj->ki", by_position, dx) + np.einsum("kij,kj->ki", by_velocity, dv)
+        torque += np.einsum("kij,kj->ki", mass, da)
+        return np.stack([torque @ robot.link_map, torque @ robot.motor_map])
+
+    def _dynamics_derivatives(
+        self, state: State, parameters: dict[str, float]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives (N, nv, nv) of the torque of bodies and rotors with position, velocity, acceleration.
+
+        The torque is linear in the inertial parameters. A unit mass is put on every body and its own derivative taken
+        off again, so that a body without mass may have a first moment.
+        """
+        robot = self.robot
+        inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
+        rotors = np.array([parameters.get(f"{rotor.rotor_group}.rotor_inertia", 0.0) for rotor in robot.rotors])
+        key = (tuple(inertial), tuple(rotors), id(state))
+        if self._derivatives is not None and self._derivatives[0] == key:
+            return self._derivatives[1]
+        unit = np.zeros_like(inertial)
+        unit[::10] = 1.0
+        offset = 1.0 + 10.0 * float(np.max(np.abs(inertial), initial=0.0))
+        spare = float(np.max(np.abs(rotors), initial=1e-6))  # keeps a rotor with a negative estimate positive
+        whole = robot.with_inertial_parameters(inertial + offset * unit, rotors + 2.0 * spare)
+        alone = robot.with_inertial_parameters(offset * unit, np.full_like(rotors, 2.0 * spare))
+        motion = state.motion
+        x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
+        v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
+        a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))
+        out = []
+        for part in (whole, alone):
+            model = part.extended_model
+            data = model.createData()
+            size = model.nv
+            parts = np.empty((3, len(motion), size, size))
+            for k in range(len(motion)):
+                pin.computeRNEADerivatives(model, data, x[k], v[k], a[k])
+                parts[0, k], parts[1, k] = data.dtau_dq, data.dtau_dv
+                parts[2, k] = data.M
+            upper = np.triu(parts[2])
+            parts[2] = upper + np.triu(upper, 1).transpose(0, 2, 1)
+            out.append(parts)
+        change = out[0] - out[1]
+        self._derivatives = (key, (change[0], change[1], change[2]))
+        return self._derivatives[1]
