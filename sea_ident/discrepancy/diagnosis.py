@@ -4,16 +4,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-
-from sea_ident.effects import effect_from_dict
-from sea_ident.estimation import Model
-from sea_ident.exceptions import ModelFileError
-
-if TYPE_CHECKING:
-    pass
 
 from sea_ident.discrepancy.findings import (
     Alternative,
@@ -27,6 +20,9 @@ from sea_ident.discrepancy.findings import (
     Verdict,
     Waveforms,
 )
+from sea_ident.effects import effect_from_dict
+from sea_ident.estimation import Model
+from sea_ident.exceptions import ModelFileError
 
 _LARGEST = 1e100  # magnitude beyond which a number was not written by a diagnosis
 
