@@ -1,7 +1,7 @@
 """A recording as periods of equations: what every comparison of model and data starts from."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -212,7 +212,12 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
 
 
 def around_reversals(
-    motion: Motion, equations: tuple[Equation, ...], periods: tuple[Motion, ...] = ()
+    motion: Motion,
+    equations: tuple[Equation, ...],
+    periods: tuple[Motion, ...] = (),
+    *,
+    samples: int = REVERSAL_SAMPLES,
+    uncertain: float = UNCERTAIN_SIGN,
 ) -> NDArray[np.bool_]:
     """(N, E) whether a motor (in its own equation a link) is about to reverse.
 
@@ -221,23 +226,38 @@ def around_reversals(
     """
     left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):
-        of_link = equation.kind is EquationKind.LINK
-        kind = "dq" if of_link else "dtheta"
+        kind = "dq" if equation.kind is EquationKind.LINK else "dtheta"
         speed = getattr(motion, kind)[:, equation.index]
-        left_out[:, e] = around_reversal(speed)
+        left_out[:, e] = around_reversal(speed, samples)
         if len(periods) > 1:
             spread = np.std([getattr(period, kind)[:, equation.index] for period in periods], axis=0, ddof=1)
-            left_out[:, e] |= np.abs(speed) < UNCERTAIN_SIGN * spread
+            left_out[:, e] |= np.abs(speed) < uncertain * spread
     return left_out
 
 
-def around_reversal(speed: FloatArray) -> NDArray[np.bool_]:
+def around_reversal(speed: FloatArray, samples: int = REVERSAL_SAMPLES) -> NDArray[np.bool_]:
     """(N,) whether a speed (N,) is about to change its sign."""
     left_out = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
     crossing = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, 1)))
-    for shift in range(-REVERSAL_SAMPLES, REVERSAL_SAMPLES):
+    for shift in range(-samples, samples):
         left_out[(crossing + shift) % len(speed)] = True
     return left_out
+
+
+def away_from_reversals(data: PeriodData) -> PeriodData:
+    """The same periods with twice as much left out around every reversal.
+
+    What is said of a model must hold there too: at reversals, the mean of what differs from pass to pass, and the
+    time of a sample within its interval, look like small effects of friction and of delay.
+    """
+    wide = around_reversals(
+        data.motion,
+        data.equations,
+        data.period_motions,
+        samples=2 * REVERSAL_SAMPLES,
+        uncertain=2.0 * UNCERTAIN_SIGN,
+    )
+    return replace(data, left_out=data.left_out | wide)
 
 
 def free_samples(left_out: NDArray[np.bool_], harmonics: int) -> NDArray[np.complex128]:

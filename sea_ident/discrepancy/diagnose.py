@@ -12,6 +12,7 @@ from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
+from sea_ident.discrepancy.confirm import Confirmed, confirm
 from sea_ident.discrepancy.data import PeriodData, period_data, waveform, wide_processing
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, MissingParameter, Verdict, Waveforms
@@ -123,8 +124,10 @@ def diagnose(
         selection = _unsearched(bench)
     else:
         selection = search(bench, bench.effects)
+    confirmed = confirm(bench, selection)
+    selection = confirmed.selection
     tell("comparing the periods", 0.5)
-    trends = compare_periods(bench, selection.final.fit, selection.final.noise, temperature)
+    trends = compare_periods(confirmed.bench, confirmed.final.fit, confirmed.final.noise, temperature)
     tell("looking for alternatives", 0.6)
     alternatives = assess.rivals(bench, selection) if basic is None else {}
     tell("testing on held-out data", 0.75)
@@ -132,7 +135,8 @@ def diagnose(
     weak = [] if held is None else [k for k, found in enumerate(held.transfers) if not found.holds]
     if held is not None and 0 < len(weak) < selection.added and held.other_motion:
         # what does not hold elsewhere beside what does was the form of the latter, no effect of its own
-        selection = without(bench, selection, weak)
+        confirmed = confirmed.less(without(bench, selection, weak))
+        selection = confirmed.selection
         alternatives = assess.rivals(bench, selection)
         held, held_notes = held_out(bench, selection, holdout)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
@@ -142,7 +146,7 @@ def diagnose(
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
     notes = replace(notes, warnings=(*notes.warnings, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
-    diagnosis = _conclude(model, bench, selection, trends, alternatives, held, change, notes)
+    diagnosis = _conclude(bench, confirmed, trends, alternatives, held, change, notes)
     diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
@@ -204,19 +208,19 @@ def _period_of(model: Model, recording: Recording | ProcessedRecording) -> float
 
 
 def _conclude(
-    model: Model,
     bench: Bench,
-    selection: Selection,
+    confirmed: Confirmed,
     trends: TrendTest,
     alternatives: dict[int, tuple[Alternative, ...]],
     held: HeldOut | None,
     change: ParameterChange | None,
     notes: check.Findings,
 ) -> Diagnosis:
+    selection = confirmed.selection
     start, final = selection.start, selection.final
-    statistic, dof, p_value = lack_of_fit(bench, start)
-    left, left_dof, left_p = lack_of_fit(bench, final)
-    remainder = remainder_share(bench, final) if left_p < LACK_LEVEL else 0.0
+    statistic, dof, p_value = lack_of_fit(confirmed.bench, confirmed.start)
+    left, left_dof, left_p = lack_of_fit(confirmed.bench, confirmed.final)
+    remainder = remainder_share(confirmed.bench, confirmed.final) if left_p < LACK_LEVEL else 0.0
     missing = [*_missing(bench, selection, alternatives, held), *(_missing_trend(bench, t) for t in trends.trends)]
     # what drifts differs from its first value in the mean too
     drifting = {(t.effect.name, t.effect.joint) for t in trends.trends}
