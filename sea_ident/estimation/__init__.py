@@ -18,8 +18,10 @@ from sea_ident.estimation.model import Excerpt, Fit, Model, Parameter
 from sea_ident.estimation.model_file import model_from_dict, read_model
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.one_shot import identify_one_shot
-from sea_ident.estimation.physical import Box, PhysicalParameters, Pull, physical_parameters
-from sea_ident.estimation.springs import SpringResult, SpringTerm, Verdict, identify_springs
+from sea_ident.estimation.physical import physical_parameters
+from sea_ident.estimation.physical_result import Box, PhysicalParameters, Pull
+from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
+from sea_ident.estimation.springs import identify_springs
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update, updated
 

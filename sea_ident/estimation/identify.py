@@ -19,7 +19,8 @@ from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.estimation.separability import unseparated_friction
 from sea_ident.estimation.solve import condition_number, solve_weighted
-from sea_ident.estimation.springs import Verdict, springs_from
+from sea_ident.estimation.spring_result import Verdict
+from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
 from sea_ident.estimation.update import updated
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sea_ident.estimation.springs import SpringResult, Verdict, circular_factor, circular_note, spring_from_torque
+from sea_ident.estimation.circularity import circular_factor, circular_note
+from sea_ident.estimation.spring_result import SpringResult, Verdict
+from sea_ident.estimation.springs import spring_from_torque
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering

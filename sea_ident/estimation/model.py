@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Effect
 from sea_ident.estimation.observations import base_rows
-from sea_ident.estimation.springs import SpringResult
+from sea_ident.estimation.spring_result import SpringResult
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot

@@ -14,7 +14,7 @@ from sea_ident.atomic import atomic_file
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Side, effect_from_dict
 from sea_ident.estimation.model import Excerpt, Fit, Model
-from sea_ident.estimation.springs import SpringResult, SpringTerm, Verdict
+from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update
 from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError

@@ -12,7 +12,7 @@ from sea_ident.estimation.estimators.weights import LEAST_REST
 from sea_ident.estimation.identify import identify
 from sea_ident.estimation.model import Model
 from sea_ident.estimation.observations import Observations, Rows, SpringSide
-from sea_ident.estimation.springs import SpringResult
+from sea_ident.estimation.spring_result import SpringResult
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.motion import Motion
