@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sea_ident.estimation.springs import circular_factor
+from sea_ident.estimation.circularity import circular_factor
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 
