@@ -8,7 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
-from sea_ident.discrepancy.base_model import completed
+from sea_ident.discrepancy.base_model import BASIC, completed
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
@@ -54,6 +54,9 @@ LACK_LEVEL = 1e-3
 
 LARGEST_REMAINDER = 3e-3
 """Share of the torque that may be left as what no model has [-]."""
+
+WORTH_A_NAME = 1e-2
+"""Share of the torque from which on what is left would be an effect of its own [-]: then no other name explains it."""
 
 UNEXPLAINED = 0.5
 """Share of the excess from which on the effects found are no explanation of it [-]."""
@@ -278,7 +281,8 @@ def _verdict(
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
-    if large and unexplained > UNEXPLAINED and not trends.trends:
+    nameless = remainder > WORTH_A_NAME and not all(m.effect in BASIC for m in structural)
+    if large and (unexplained > UNEXPLAINED or nameless) and not trends.trends:
         return Verdict.NOT_IN_LIBRARY
     if any(m.alternatives for m in structural):
         return Verdict.AMBIGUOUS
