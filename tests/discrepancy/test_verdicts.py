@@ -9,7 +9,7 @@ import pytest
 import sea_ident
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
-from sea_ident.discrepancy.diagnose import _verdict
+from sea_ident.discrepancy.conclude import verdict_of
 from sea_ident.discrepancy.findings import Alternative, MissingEffect
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
@@ -115,17 +115,21 @@ def test_every_verdict_follows_from_findings():
         data = Data()
 
     class Trends:
+        trends = ()
         unnamed = False
 
     effect = MissingEffect("torque_ripple", "hip", (), 0.05, 1e-9, ())
     other = replace(effect, alternatives=(Alternative("torque_offset", "hip", 1.0),))
 
     def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False):
-        return _verdict(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal))
+        return verdict_of(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal))
 
     assert verdict([]) is Verdict.NONE
     assert verdict([effect]) is Verdict.NAMED
     assert verdict([effect], remainder=0.01) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([effect], remainder=0.011) is Verdict.NOT_IN_LIBRARY
+    assert verdict([replace(effect, effect="coulomb_friction")], remainder=0.011) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([effect], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
     assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
     assert verdict([], remainder=0.01) is Verdict.NOT_IN_LIBRARY

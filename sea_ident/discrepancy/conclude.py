@@ -1,0 +1,260 @@
+"""What a search, its confirmation and the held-out data add up to: the verdict and its evidence."""
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy import assess, check, words
+from sea_ident.discrepancy.base_model import BASIC
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.data import waveform
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, MissingParameter, Verdict, Waveforms
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.judge import own_torque
+from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
+from sea_ident.discrepancy.locate import locate
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.reference import ParameterChange
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.effects.signal import SignalEffect
+
+FEWEST_PERIODS = 10
+"""Periods from which on an effect is named without reservation."""
+
+LARGEST_LEFT = 0.1
+"""Share of the torque that may be left beside what few periods name [-]."""
+
+LACK_LEVEL = 1e-3
+"""Probability below which a remainder counts as something that is missing."""
+
+LARGEST_REMAINDER = 3e-3
+"""Share of the torque that may be left as what no model has [-]."""
+
+WORTH_A_NAME = 1e-2
+"""Share of the torque from which on what is left would be an effect of its own [-]: then no other name explains it."""
+
+UNEXPLAINED = 0.5
+"""Share of the excess from which on the effects found are no explanation of it [-]."""
+
+
+def conclude(
+    bench: Bench,
+    confirmed: Confirmed,
+    trends: TrendTest,
+    alternatives: dict[int, tuple[Alternative, ...]],
+    held: HeldOut | None,
+    change: ParameterChange | None,
+    notes: check.Findings,
+) -> Diagnosis:
+    """Put together what is known of one recording.
+
+    Args:
+        bench: the recording.
+        confirmed: what was found in the mean, as far as it holds away from the reversals.
+        trends: what changes from period to period.
+        alternatives: what else each effect could be, by its position in the model.
+        held: the data that were not used.
+        change: against an earlier model, where one was given.
+        notes: what is wrong with the data.
+
+    Returns:
+        The diagnosis, without model and forward simulation.
+    """
+    selection = confirmed.selection
+    start, final = selection.start, selection.final
+    statistic, dof, p_value = lack_of_fit(confirmed.bench, confirmed.start)
+    left, left_dof, left_p = lack_of_fit(confirmed.bench, confirmed.final)
+    remainder = remainder_share(confirmed.bench, confirmed.final) if left_p < LACK_LEVEL else 0.0
+    missing = [*_missing(bench, selection, alternatives, held), *(_missing_trend(bench, t) for t in trends.trends)]
+    # what drifts differs from its first value in the mean too
+    drifting = {(t.effect.name, t.effect.joint) for t in trends.trends}
+    missing = [m for m in missing if (f"{m.effect}_drift", m.joint) not in drifting]
+    if change is not None:
+        missing.extend(change.missing)
+    missing.sort(key=lambda m: -m.torque_share)
+    unexplained = max(left - left_dof, 0.0) / max(statistic - dof, 1.0) if selection.added else 1.0
+    verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes)
+    gap = gap_of(bench, start.fit, final.fit, final.noise)
+    held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
+    facts = words.Facts(
+        verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
+        periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
+        other_motion=held is not None and held.other_motion,
+    )  # fmt: skip
+    return Diagnosis(
+        verdict=verdict,
+        text=words.paragraph(facts),
+        lack_of_fit=LackOfFit(
+            statistic, dof, p_value, trends.p_value, _per_joint(bench, start.fit, start.noise), remainder
+        ),
+        locations=locate(bench, start.fit, start.noise),
+        missing=tuple(missing),
+        training=gap,
+        holdout=held_gap,
+        detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates),
+        warnings=tuple(dict.fromkeys((*notes.warnings, *trends.notes, *words.reservations(facts, held is not None)))),
+        waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
+        recording=bench.data.source,
+        holdout_source=None if held is None else held.source,
+    )
+
+
+def verdict_of(
+    bench: Bench,
+    missing: list[MissingEffect],
+    trends: TrendTest,
+    change: ParameterChange | None,
+    remainder: float,
+    unexplained: float,
+    notes: check.Findings,
+) -> Verdict:
+    """The verdict.
+
+    Args:
+        bench: the recording.
+        missing: what is named.
+        trends: what changes from period to period.
+        change: against an earlier model; what is missing by it alone does not count as missing from the model.
+        remainder: rms of what is left, as a share of the torque [-].
+        unexplained: share of the excess that is left [-].
+        notes: what is wrong with the data.
+
+    Returns:
+        The verdict.
+    """
+    if notes.fatal:
+        return Verdict.CANNOT_TELL
+    structural = [m for m in missing if change is None or m not in change.missing]
+    large = remainder > LARGEST_REMAINDER
+    if not structural:
+        if large or trends.unnamed:
+            return Verdict.NOT_IN_LIBRARY if bench.data.periods >= FEWEST_PERIODS else Verdict.CANNOT_TELL
+        if change is not None and change.changed:
+            return Verdict.ONLY_AGAINST_REFERENCE
+        return Verdict.NONE
+    if any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
+        return Verdict.SUSPECT
+    if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
+        return Verdict.CANNOT_TELL
+    nameless = remainder > WORTH_A_NAME and not all(m.effect in BASIC for m in structural)
+    if large and (unexplained > UNEXPLAINED or nameless) and not trends.trends:
+        return Verdict.NOT_IN_LIBRARY
+    if any(m.alternatives for m in structural):
+        return Verdict.AMBIGUOUS
+    if large or trends.unnamed:
+        return Verdict.NAMED_WITH_REMAINDER
+    return Verdict.NAMED
+
+
+def _missing(
+    bench: Bench,
+    selection: Selection,
+    alternatives: dict[int, tuple[Alternative, ...]],
+    held: HeldOut | None,
+) -> list[MissingEffect]:
+    fit = selection.final.fit
+    first = len(fit.effects) - selection.added
+    counts = bench.counts(fit.effects)
+    out = []
+    for k, position in enumerate(range(first, len(fit.effects))):
+        effect = fit.effects[position]
+        begin = sum(counts[:position])
+        columns = fit.columns[begin : begin + counts[position]]
+        parameters = [
+            MissingParameter(c.name, float(fit.values[begin + i]), fit.std(begin + i), c.unit)
+            for i, c in enumerate(columns)
+        ]
+        parameters.extend(_shape_parameters(bench, fit, position))
+        transfer = held.transfers[k] if held is not None and held.transfers else None
+        out.append(
+            MissingEffect(
+                effect=effect.name,
+                joint=effect.joint,
+                parameters=tuple(parameters),
+                torque_share=own_torque(bench, fit, position),
+                p_value=selection.p_values[k],
+                alternatives=alternatives.get(position, ()),
+                transfer=None if transfer is None or not transfer.tested else transfer.share,
+                detail=effect,
+                values=tuple(float(v) for v in fit.values[begin : begin + counts[position]]),
+            )
+        )
+    return out
+
+
+def _shape_parameters(bench: Bench, fit: Fit, position: int) -> list[MissingParameter]:
+    effect = fit.effects[position]
+    shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
+    out = []
+    for shape in shapes:
+        value = float(getattr(effect, shape.name))
+        std = 0.0
+        for k, (owner, free) in enumerate(fit.free_shapes):
+            if owner == position and free.name == shape.name:
+                step = fit.std(len(fit.columns) + k)
+                std = step * abs(value) if shape.logarithmic else step * (shape.upper - shape.lower)
+        out.append(
+            MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
+        )
+    return out
+
+
+def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
+    effect = trend.effect
+    parameters = [
+        MissingParameter(c.name, float(v), float(s), c.unit)
+        for c, v, s in zip(effect.columns(bench.robot), trend.values, trend.stds, strict=True)
+    ]
+    parameters.extend(
+        MissingParameter(effect.parameter_name(s.name), float(getattr(effect, s.name)), 0.0, s.unit)
+        for s in effect.shapes
+    )
+    others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
+    return MissingEffect(
+        effect=effect.name,
+        joint=effect.joint,
+        parameters=tuple(parameters),
+        torque_share=trend.torque_change,
+        p_value=trend.p_value,
+        alternatives=others,
+        detail=effect,
+        values=tuple(float(v) for v in trend.values),
+    )
+
+
+def _per_joint(bench: Bench, fit: Fit, noise: NoiseFloor) -> dict[str, dict[str, float]]:
+    """Energy of the residual over that of the noise by joint and equation."""
+    clean = np.sum(np.abs(bench.clean_residual(fit, noise)) ** 2, axis=0)
+    out: dict[str, dict[str, float]] = {joint: {} for joint in bench.robot.joint_names}
+    for e, equation in enumerate(bench.data.equations):
+        out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise.std[e] ** 2, 1e-300))
+    return out
+
+
+def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selection: Selection) -> Waveforms:
+    data = bench.data
+    labels = tuple(f"{eq.joint} {eq.kind}" for eq in data.equations)
+    explained: dict[str, FloatArray] = {}
+    bands: dict[str, FloatArray] = {}
+    first = len(after.effects) - selection.added
+    for position in range(first, len(after.effects)):
+        effect = after.effects[position]
+        label = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
+        explained[label] = waveform(assess.contribution(bench, after, [position]), data.samples)
+        bands[label] = assess.torque_std(bench, after, position)
+    return Waveforms(
+        time=data.motion.time - data.motion.time[0],
+        equations=labels,
+        before=waveform(bench.clean_residual(before, noise), data.samples),
+        after=waveform(bench.clean_residual(after, noise), data.samples),
+        noise=noise.std,
+        q=data.motion.q,
+        dtheta=data.motion.dtheta,
+        deflection=data.motion.deflection,
+        explained=explained,
+        bands=bands,
+    )
