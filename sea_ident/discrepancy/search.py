@@ -7,6 +7,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.edges import with_sharp_edges
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
@@ -22,7 +23,6 @@ from sea_ident.discrepancy.judge import (
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
-from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 
 FAMILY_LEVEL = 1e-3
@@ -57,9 +57,6 @@ FINALISTS = 4
 
 LAST_TWO = 2
 """Of these the best are compared with the shapes of the model refined too."""
-
-EDGE_STEP = 16
-"""Edges of a push are first moved by this part of the period."""
 
 LITTLE_LEFT = 0.02
 """An effect that leaves less than this share of the excess is only compared with those that promise more than it."""
@@ -121,7 +118,7 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
         if step is None:
             break
         new, p_value = step
-        largest = max(largest, torque_change(bench, now.fit, new))
+        largest = max(largest, visible_change(bench, now.fit, new))
         added.append(p_value)
         last = now
         now = settle_again(bench, new)
@@ -158,10 +155,10 @@ def _next(
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
             continue
-        change = torque_change(bench, fit, new)
         own = own_torque(bench, new, -1)
-        cancels = own > LARGE_TORQUE and change < CANCELLED * own and not is_signal(candidate.effect)
-        if min(change, 2.0 * own) < smallest or cancels or at_a_bound(new.effects[-1]):
+        hidden = own > LARGE_TORQUE and torque_change(bench, fit, new) < CANCELLED * own
+        cancels = hidden and not is_signal(candidate.effect)
+        if visible_change(bench, fit, new) < smallest or cancels or at_a_bound(new.effects[-1]):
             continue
         if scatter_p(periods, fit.whitened - new.whitened) > SCATTER_LEVEL:
             continue
@@ -179,6 +176,14 @@ def _next(
     return None if best is None else (best[1], best[2])
 
 
+def visible_change(bench: Bench, before: Fit, after: Fit) -> float:
+    """Largest change by the last effect of a fit in any equation, as a share of the torque there [-].
+
+    Where the model bent to do without it, the change is larger than the effect and says nothing of its size.
+    """
+    return min(torque_change(bench, before, after), 2.0 * own_torque(bench, after, -1))
+
+
 def refitted(
     bench: Bench,
     before: Sequence[Effect],
@@ -194,31 +199,7 @@ def refitted(
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
     fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
     best = min(fits, key=lambda fit: fit.statistic)
-    return with_sharp_edges(bench, best, noise, len(before)) if isinstance(effect, ExternalForce) else best
-
-
-def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
-    """A fit with the begin and the end of a push moved by smaller and smaller steps, down to one sample.
-
-    The statistic jumps from sample to sample, so there is no derivative to follow.
-    """
-    period, samples = bench.data.period, bench.data.samples
-    interval = period / samples
-    step = max(samples // EDGE_STEP, 1)
-    while step:
-        better = fit
-        for name in ("start", "stop"):
-            for sign in (-1, 1):
-                effects = list(better.effects)
-                moved_edge = float(np.mod(getattr(effects[position], name) + sign * step * interval, period))
-                effects[position] = replace(effects[position], **{name: moved_edge})  # type: ignore[arg-type]
-                new = bench.fit(effects, noise, start=better.parameters, tangents=False)
-                if new.statistic < better.statistic:
-                    better = new
-        if better is fit:
-            step //= 2
-        fit = better
-    return bench.fit(fit.effects, noise, start=fit.parameters)
+    return with_sharp_edges(bench, best, noise, len(before))
 
 
 def of_every_kind(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
@@ -253,7 +234,11 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
         own = effect_key(fit.effects[position])
         best = fit
         rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
-        for candidate in of_every_kind(rivals, CHALLENGERS):
+        tried = of_every_kind(rivals, CHALLENGERS)
+        # what a first step along a tangent says of an effect in the chain of signals is not much
+        joint = fit.effects[position].joint
+        tried += [c for c in rivals if is_signal(c.effect) and c.effect.joint == joint and c not in tried]
+        for candidate in tried:
             if candidate.gain < 0.5 * (reduced.statistic - fit.statistic) and not is_signal(candidate.effect):
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)

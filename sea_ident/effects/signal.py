@@ -64,13 +64,22 @@ class SignalEffect(Effect):
         return robot.index(self.joint)
 
 
+WANDERED = 0.5
+"""Share of the largest step by which the ends of the mean of periods may miss each other [-]."""
+
+
 def is_closed(values: FloatArray) -> bool:
-    """Whether samples (N,) or (N, n) of one uniform period close on themselves."""
+    """Whether samples (N,) or (N, n) of one uniform period close on themselves.
+
+    The mean of periods that wander, as those of a joint without a controller of its position do, closes but for a part
+    of a step.
+    """
     if len(values) < 8:
         return False
     bend = np.abs(np.diff(values, n=2, axis=0)).max(axis=0)
+    step = np.abs(np.diff(values, axis=0)).max(axis=0)
     gap = np.abs(values[0] - (2.0 * values[-1] - values[-2]))
-    return bool(np.all(gap <= 3.0 * bend + 1e-12))
+    return bool(np.all(gap <= np.maximum(3.0 * bend, WANDERED * step) + 1e-12))
 
 
 def ahead(time: FloatArray, values: FloatArray, by: float) -> FloatArray:
