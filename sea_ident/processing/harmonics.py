@@ -1,10 +1,16 @@
 """Fourier series of periodic signals: how many harmonics the data support, and the derivatives."""
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from sea_ident._typing import FloatArray
 
 SIGNIFICANCE = 1e-3
+
+FEWEST_AT_END = 6
+"""Samples at least through which the end of a stretch of periods is laid."""
 
 
 def spectrum(stack: FloatArray) -> FloatArray:
@@ -87,33 +93,92 @@ def differentiate(values: FloatArray, period: float, harmonics: int) -> tuple[Fl
 
 
 def differentiate_periods(
-    stack: FloatArray, period: float, harmonics: int
+    stack: FloatArray, period: float, harmonics: int, places: Sequence[int] | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Every period filtered and differentiated like the mean.
 
     The mean is a Fourier series. What a period differs by from it is not periodic: a series fitted to it alone would
-    jump at both of its ends, and its derivatives with it. So the differences are laid end to end, over the whole
-    recording.
+    jump at both of its ends, and its derivatives with it. So the differences are laid end to end, as far as the periods
+    follow each other. Where they do not, and at both ends of the recording, what comes next is not known: the
+    differences are led on by their value and slope, so that their curvature there is taken too small, within about a
+    wavelength of the last harmonic.
 
     Args:
-        stack: (P, N, n) positions of consecutive periods.
+        stack: (P, N, n) positions of the periods, in the order of their time.
         period: [s].
         harmonics: L, at most (N - 1) // 2.
+        places: (P,) number of every period in the recording, rising, as some may have been left out; consecutive where
+            None.
 
     Returns:
         Positions, velocities and accelerations, each (P, N, n).
     """
     periods, samples, joints = stack.shape
-    centre = stack.mean(axis=0)
+    runs = _consecutive(range(periods) if places is None else places)
+    width = min(max(samples // (2 * harmonics), FEWEST_AT_END), samples // 2)
+    centre = stack.mean(axis=0) - _seam(stack, runs, width)
     means = differentiate(centre, period, harmonics)
-    rest = (stack - centre).reshape(periods * samples, joints)
-    # mirrored about both of its ends and faded out, so that neither it nor its slope jumps where the series closes
+    parts = [np.empty_like(stack) for _ in range(3)]
+    for run in runs:
+        rest = (stack[run] - centre).reshape(-1, joints)
+        long, reach = _extended(rest, width, samples)
+        length = len(long) * period / samples
+        found = differentiate(long, length, int((min(harmonics, (samples - 1) // 2) + 0.5) * length / period))
+        for part, mean, more in zip(parts, means, found, strict=True):
+            part[run] = mean + more[reach : reach + len(rest)].reshape(-1, samples, joints)
+    return parts[0], parts[1], parts[2]
+
+
+def _consecutive(places: Sequence[int]) -> list[slice]:
+    """Stretches of periods that follow each other without a gap."""
+    breaks = np.flatnonzero(np.diff(np.asarray(places)) != 1) + 1
+    return [slice(int(a), int(b)) for a, b in pairwise([0, *breaks, len(places)])]
+
+
+def _line_at(values: FloatArray, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) value and slope per step, where the steps are zero, of the parabola through (W, n) values."""
+    found = np.polynomial.polynomial.polyfit(steps, values, 2)
+    return found[0], found[1]
+
+
+def _seam(stack: FloatArray, runs: Sequence[slice], width: int) -> FloatArray:
+    """(N, n) the parabola that takes from the mean period the step, in value and slope, where its end meets its start.
+
+    The mean of periods that drift does not close: at every place in between, the end of one period is the start of the
+    next, but the first start and the last end remain. Both are compared with the mean of what passes over the places in
+    between, which has no step.
+    """
+    periods, samples, joints = stack.shape
+    inner = [p for run in runs for p in range(run.start, run.stop - 1)]
+    if not inner:
+        return np.zeros((samples, joints))
+    before = np.mean([stack[p, -width:] for p in inner], axis=0)
+    after = np.mean([stack[p + 1, :width] for p in inner], axis=0)
+    starts = np.sum([stack[run.start, :width] - after for run in runs], axis=0)
+    ends = np.sum([stack[run.stop - 1, -width:] - before for run in runs], axis=0)
+    steps = np.arange(width, dtype=np.float64)
+    value, slope = (
+        (start - end) / periods
+        for start, end in zip(_line_at(starts, steps), _line_at(ends, steps - width), strict=True)
+    )
+    phase = (np.arange(samples) / samples - 0.5)[:, None]
+    return np.asarray(-value * phase - 0.5 * samples * slope * phase**2, dtype=np.float64)
+
+
+def _extended(rest: FloatArray, width: int, samples: int) -> tuple[FloatArray, int]:
+    """Differences (M, n), mirrored about both of their ends and faded out, so that they close without a jump.
+
+    Mirrored in a point, the slope is the same on both sides. The point is that of a parabola through the last samples,
+    so that the noise of a single one does not make a step.
+
+    Returns:
+        (M + 2 reach, n) differences, and the reach.
+    """
     reach = min(samples, len(rest) - 1)
     fade = 0.5 * (1.0 + np.cos(np.pi * (np.arange(reach) + 1.0) / (reach + 1.0)))[:, None]
-    before = (2.0 * rest[0] - rest[reach:0:-1]) * fade[::-1]
-    after = (2.0 * rest[-1] - rest[-2 : -reach - 2 : -1]) * fade
-    long = np.concatenate([before, rest, after])
-    length = len(long) * period / samples
-    parts = differentiate(long, length, int((min(harmonics, (samples - 1) // 2) + 0.5) * length / period))
-    inside = slice(reach, reach + len(rest))
-    return tuple(mean + part[inside].reshape(stack.shape) for mean, part in zip(means, parts, strict=True))  # type: ignore[return-value]
+    steps = np.arange(width, dtype=np.float64)
+    start, _ = _line_at(rest[:width], steps)
+    end, _ = _line_at(rest[-width:], steps - (width - 1))
+    before = (2.0 * start - rest[reach:0:-1]) * fade[::-1]
+    after = (2.0 * end - rest[-2 : -reach - 2 : -1]) * fade
+    return np.concatenate([before, rest, after]), reach

@@ -239,7 +239,7 @@ def _periodic(
                 f"{recording.source}: {label} is {number}; {cut.samples} samples allow 1 .. {(cut.samples - 1) // 2}"
             )
     time: FloatArray = np.arange(cut.samples, dtype=np.float64) * (period / cut.samples)
-    parts = _motions(time, period, cuts["q"], cuts["theta"], links, motors, elastic)
+    parts = _motions(time, period, cuts["q"], cuts["theta"], links, motors, elastic, keep)
     motion = Motion.mean(parts)
     factor = torque.transmitted(cuts["torque"].mean(axis=0), signals.torque.efficiency, motion.dtheta)
     tau = cuts["torque"] * factor
@@ -310,12 +310,13 @@ def _motions(
     links: int,
     motors: int,
     elastic: np.typing.NDArray[np.intp],
+    places: list[int],
 ) -> tuple[Motion, ...]:
-    """Motions (P,) from positions (P, N, n) of consecutive periods."""
-    link = harmonics.differentiate_periods(q, period, links)
+    """Motions (P,) from positions (P, N, n) of periods, with their places (P,) in the recording."""
+    link = harmonics.differentiate_periods(q, period, links, places)
     motor = [part.copy() for part in link]
     if elastic.size:
-        found = harmonics.differentiate_periods(theta[:, :, elastic], period, motors)
+        found = harmonics.differentiate_periods(theta[:, :, elastic], period, motors, places)
         for whole, part in zip(motor, found, strict=True):
             whole[:, :, elastic] = part
     return tuple(Motion(time, *(part[p] for part in (*link, *motor))) for p in range(len(q)))
