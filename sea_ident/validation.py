@@ -1,5 +1,6 @@
 """`validate`: how well a model predicts a recording that was not used to find it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from sea_ident._typing import FloatArray
-from sea_ident.estimation import Model
+from sea_ident.estimation import Agreement, Model
+from sea_ident.estimation.agreement import agreement
+from sea_ident.estimation.observations import friction_is_modelled
 from sea_ident.exceptions import RecordingError
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
@@ -32,6 +35,7 @@ class Validation:
         processed: the recording as it was compared.
         predicted: (N, n) predicted torque [N m] or [N].
         used: (N,) which samples were compared.
+        agreement: residual away from reversals beside its noise; None where one period says nothing of noise.
         warnings: what a user should know.
     """
 
@@ -45,15 +49,17 @@ class Validation:
     processed: ProcessedRecording
     predicted: FloatArray
     used: NDArray[np.bool_]
+    agreement: Agreement | None = None
     warnings: tuple[str, ...] = ()
 
     def summary(self) -> str:
         """One line per joint."""
         lines = [f"prediction of {self.recording}, {self.samples} samples"]
+        away = None if self.agreement is None else self.agreement.words()
         for i, name in enumerate(self.joint_names):
             lines.append(
                 f"  {name}: rms {self.rms[i]:.4g} of {self.rms_torque[i]:.4g} ({100 * self.nrms[i]:.2f} %), noise "
-                f"{self.noise_std[i]:.3g}"
+                f"{self.noise_std[i]:.3g}{'' if away is None else away[i]}"
             )
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
@@ -65,7 +71,14 @@ class Validation:
             key: {name: float(v) for name, v in zip(self.joint_names, values, strict=True)}
             for key, values in named.items()
         }
-        return {**record, "samples": self.samples, "recording": self.recording, "warnings": list(self.warnings)}
+        away = None if self.agreement is None else self.agreement.to_dict(self.joint_names)
+        return {
+            **record,
+            "agreement": away,
+            "samples": self.samples,
+            "recording": self.recording,
+            "warnings": list(self.warnings),
+        }
 
 
 def validate(
@@ -75,6 +88,7 @@ def validate(
     period: float | None = None,
     link_harmonics: int | None = None,
     motor_harmonics: int | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Validation:
     """Compare the torque that a model predicts with the torque that was measured.
 
@@ -86,6 +100,7 @@ def validate(
         period: [s]; found from the data where None; a recording without a period is filtered instead.
         link_harmonics: harmonics of q; chosen from the data where None.
         motor_harmonics: harmonics of theta; chosen from the data where None.
+        progress: called with what is being done and the share that is done.
 
     Returns:
         Rms of the difference per joint, beside the noise.
@@ -93,6 +108,8 @@ def validate(
     Raises:
         RecordingError: a column is missing, or an external force acts throughout.
     """
+    tell = progress or (lambda what, share: None)
+    tell("averaging the periods", 0.0)
     if isinstance(recording, ProcessedRecording):
         processed = recording
     elif all(recording.has("external_force", joint) for joint in model.robot.joint_names):
@@ -102,6 +119,7 @@ def validate(
         processed = process(
             recording, model.robot, period=period, link_harmonics=link_harmonics, motor_harmonics=motor_harmonics
         )
+    tell("predicting the torque", 0.2)
     predicted = model.predict(processed.motion, processed.channels)
     used = np.ones(processed.samples, dtype=bool)
     found = list(processed.warnings)
@@ -114,9 +132,15 @@ def validate(
                 f"{processed.source}: {np.count_nonzero(~used)} of {len(used)} samples are left out, where an external "
                 f"force acts or did within {AFTER_FORCE:g} s"
             )
-    difference = (processed.tau_motor - predicted)[used]
+    apart = processed.tau_motor - predicted
+    difference = apart[used]
     rms = np.sqrt(np.mean(difference**2, axis=0))
     rms_torque = np.sqrt(np.mean(processed.tau_motor[used] ** 2, axis=0))
+    each = []
+    for p, motion in enumerate(processed.period_motions):
+        tell(f"predicting period {p + 1} of {processed.periods}", 0.2 + 0.8 * p / processed.periods)
+        each.append(processed.period_tau_motor[p] - model.predict(motion, processed.channels))
+    counted = friction_is_modelled(model.robot, model.effects, processed.motion) & used[:, None]
     noise = np.sqrt(processed.raw_tau_variance[used].mean(axis=0) / processed.periods)
     nrms = np.divide(rms, rms_torque, out=np.full_like(rms, np.inf), where=rms_torque > 0.0)
     return Validation(
@@ -130,6 +154,7 @@ def validate(
         processed=processed,
         predicted=predicted,
         used=used,
+        agreement=agreement(apart, np.array(each), counted),
         warnings=tuple(found),
     )
 

@@ -5,7 +5,7 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -95,6 +95,15 @@ class Tell(Protocol):
 
     def __call__(self, done: int, what: str | None = None, total: int | None = None) -> None:
         """So many steps are done; what is being done now; of how many, where that has changed."""
+
+
+SHARES = 1000
+"""Steps of a bar for work that tells its share."""
+
+
+def by_share(tell: Tell) -> Callable[[str, float], None]:
+    """What functions call that tell what they do and the share that is done."""
+    return lambda what, share: tell(round(SHARES * share), what)
 
 
 def _silent(done: int, what: str | None = None, total: int | None = None) -> None:

@@ -1,5 +1,6 @@
 """Estimation: base parameters, springs, and how sure both are."""
 
+from sea_ident.estimation.agreement import Agreement
 from sea_ident.estimation.estimators import (
     Estimate,
     Estimator,
@@ -26,6 +27,7 @@ from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update, updated
 
 __all__ = [
+    "Agreement",
     "Box",
     "Change",
     "CovarianceKind",

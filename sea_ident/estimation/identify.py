@@ -1,7 +1,7 @@
 """`identify`: from a recording to a model."""
 
 import warnings as python_warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.base import Side
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.model import Excerpt, Fit, Model
@@ -42,6 +43,8 @@ DENSE = 200 * 2**20
 UNSAFE = (Verdict.CIRCULAR, Verdict.NOT_EXCITED)
 """Verdicts on springs of which a user is warned."""
 
+Progress = Callable[[str, float], None]
+
 EXCERPT = 500
 """Samples of the mean period that a model keeps."""
 
@@ -57,6 +60,7 @@ def identify(
     motor_harmonics: int | None = None,
     unknown_zero: Sequence[str] = (),
     prior: Model | None = None,
+    progress: Progress | None = None,
 ) -> Model:
     """Identify the dynamic model of a robot, then its springs (paper, II.B and II.E).
 
@@ -73,6 +77,7 @@ def identify(
         motor_harmonics: harmonics of theta; chosen from the data where None.
         unknown_zero: joints whose encoders of theta and q have different, unknown zeros.
         prior: an earlier model of the robot, with the same effects; what has not changed since is taken from both.
+        progress: called with what is being done and the share that is done.
 
     Returns:
         The model. Its standard deviations are those that the spread between periods shows.
@@ -81,9 +86,11 @@ def identify(
         RecordingError: the recording lacks what is needed.
         IdentificationError: the data do not determine the model, or contradict its physics in every joint.
     """
+    tell = progress or (lambda what, share: None)
     if isinstance(recording, ProcessedRecording):
         processed = recording
     else:
+        tell("averaging the periods", 0.0)
         processed = process(
             recording, robot, period=period, link_harmonics=link_harmonics, motor_harmonics=motor_harmonics
         )
@@ -96,19 +103,23 @@ def identify(
     how = default_estimator(processed) if estimator is None else estimator
     found: list[str] = list(processed.warnings)
     first = len(found)
+    tell("finding base parameters", 0.15)
     base, lost = visible_parameters(robot, chosen, processed)
     found.extend(lost)
     observations = Observations(robot, chosen, base, processed)
+    tell(f"estimating {base.rank} base parameters", 0.2)
     if processed.periods == 1 and processed.samples * robot.n * base.rank * 8 > DENSE and not in_springs:
         model, more = identify_long(observations, how, unknown_zero)
         return _reported(model, [*found, *more, *_doubts(model)], first, processed.notes)
     estimate = how.estimate(observations)
+    tell("comparing the periods", 0.75)
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
     found.extend(_check_signs(observations))
     model = _model(observations, estimate, uncertainty, how.name)
     if prior is not None:
         model = _refitted(updated(model, prior), observations)
+    tell("identifying springs", 0.85)
     springs = springs_from(observations, model.values, model.uncertainty, unknown_zero, in_springs)
     model = replace(model, springs=springs)
     found.extend(_doubts(model))
@@ -280,7 +291,7 @@ def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
 
 def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertainty, name: str) -> Model:
     processed, rows = observations.processed, observations.rows
-    residual = observations.residual(estimate.values)
+    residual, scatter = observations.residual(estimate.values), observations.period_residuals(estimate.values)
     plain = solve_weighted(rows, observations.torque)
     fit = Fit(
         rms_residual=np.sqrt(np.mean(residual**2, axis=0)),
@@ -292,6 +303,7 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
         samples=processed.samples,
         periods=processed.periods,
         period=processed.period,
+        agreement=agreement(residual, scatter, observations.valid),
     )
     weighted = rows * estimate.weights[:, :, None]
     count = rows.shape[-1]
@@ -319,21 +331,37 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
         tau_std=np.sqrt(processed.raw_tau_variance[thin]),
         tau_model=processed.tau_motor[thin] - residual[thin],
         tau_spring=spring,
+        residual_std=_spread(scatter, processed)[thin],
     )
     return replace(model, excerpt=excerpt)
 
 
 def _refitted(model: Model, observations: Observations) -> Model:
     """The residuals of a model whose values were changed after the fit."""
-    residual = observations.residual(model.values)
+    residual, scatter = observations.residual(model.values), observations.period_residuals(model.values)
     thin = slice(None, None, max(1, -(-len(residual) // EXCERPT)))
     return replace(
         model,
-        fit=replace(model.fit, rms_residual=np.sqrt(np.mean(residual**2, axis=0))),
-        excerpt=replace(model.excerpt, tau_model=observations.torque[thin] - residual[thin]),
+        fit=replace(
+            model.fit,
+            rms_residual=np.sqrt(np.mean(residual**2, axis=0)),
+            agreement=agreement(residual, scatter, observations.valid),
+        ),
+        excerpt=replace(
+            model.excerpt,
+            tau_model=observations.torque[thin] - residual[thin],
+            residual_std=_spread(scatter, observations.processed)[thin],
+        ),
     )
+
+
+def _spread(residuals: FloatArray, processed: ProcessedRecording) -> FloatArray:
+    """(N, n) standard deviation of the residuals (P, N, n) of the periods; of the torque where there is one only."""
+    if len(residuals) < 2:
+        return np.sqrt(processed.raw_tau_variance)
+    return np.asarray(residuals.std(axis=0, ddof=1), dtype=np.float64)
 
 
 def _no_excerpt(n: int) -> Excerpt:
     empty = np.zeros((0, n))
-    return Excerpt(Motion.rigid(np.zeros(0), empty, empty, empty), empty, empty, empty, empty)
+    return Excerpt(Motion.rigid(np.zeros(0), empty, empty, empty), empty, empty, empty, empty, empty)

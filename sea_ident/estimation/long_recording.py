@@ -106,7 +106,7 @@ def identify_stream(
             periods=1,
             period=None,
         ),
-        excerpt=Excerpt(motion, torque, np.zeros_like(torque), predicted, none),
+        excerpt=Excerpt(motion, torque, np.zeros_like(torque), predicted, none, np.zeros_like(torque)),
         recording=source,
         warnings=uncertainty.warnings,
     )

@@ -11,6 +11,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Effect
+from sea_ident.estimation.agreement import Agreement
 from sea_ident.estimation.observations import base_rows
 from sea_ident.estimation.spring_result import SpringResult
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
@@ -35,6 +36,7 @@ class Fit:
         samples: N of the mean motion.
         periods: P.
         period: [s], None where the recording is not periodic.
+        agreement: residual away from reversals beside its noise; None where one period says nothing of noise.
     """
 
     rms_residual: FloatArray
@@ -46,6 +48,7 @@ class Fit:
     samples: int
     periods: int
     period: float | None
+    agreement: Agreement | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,7 @@ class Excerpt:
         tau_std: (K, n) standard deviation of the torque of one period [N m].
         tau_model: (K, n) torque of the model [N m].
         tau_spring: (K, m) spring torque of the elastic joints [N m].
+        residual_std: (K, n) standard deviation of the residual of one period, noise of the encoders in it [N m].
     """
 
     motion: Motion
@@ -65,6 +69,7 @@ class Excerpt:
     tau_std: FloatArray
     tau_model: FloatArray
     tau_spring: FloatArray
+    residual_std: FloatArray
 
 
 @dataclass(frozen=True)
@@ -228,10 +233,11 @@ class Model:
         for name, value, std, wide, unit in zip(self.names, self.values, self.std, half, self.base.units, strict=True):
             lines.append(f"  {name:<{width}}  {value:>12.6g} +- {std:<10.3g} 95 %: +- {wide:<10.3g} {unit}")
         lines.extend(f"  spring {spring.summary()}" for spring in self.springs)
+        near = None if self.fit.agreement is None else self.fit.agreement.words()
         for i, name in enumerate(self.robot.joint_names):
             lines.append(
                 f"  {name}: residual {self.fit.rms_residual[i]:.4g}, noise {self.fit.noise_std[i]:.4g}, torque "
-                f"{self.fit.rms_torque[i]:.4g} (rms)"
+                f"{self.fit.rms_torque[i]:.4g} (rms){'' if near is None else near[i]}"
             )
         if self.update is not None:
             lines.extend(f"  {line}" for line in self.update.summary().splitlines())

@@ -13,6 +13,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.atomic import atomic_file
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Side, effect_from_dict
+from sea_ident.estimation.agreement import Agreement
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
@@ -54,6 +55,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "samples": fit.samples,
             "periods": fit.periods,
             "period": fit.period,
+            "agreement": None if fit.agreement is None else fit.agreement.to_dict(names),
         },
         "uncertainty": {
             "kind": str(model.uncertainty.kind),
@@ -226,6 +228,7 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
             samples=int(fit["samples"]),
             periods=int(fit["periods"]),
             period=None if fit["period"] is None else float(fit["period"]),
+            agreement=Agreement.from_dict(fit.get("agreement"), joints),
         ),
         excerpt=_excerpt_from_dict(record["excerpt"], robot),
         recording=str(record["recording"]),
@@ -351,6 +354,7 @@ def _excerpt_to_dict(excerpt: Excerpt) -> dict[str, Any]:
         "time": motion.time, "q": motion.q, "dq": motion.dq, "ddq": motion.ddq, "theta": motion.theta,
         "dtheta": motion.dtheta, "ddtheta": motion.ddtheta, "tau_motor": excerpt.tau_motor,
         "tau_std": excerpt.tau_std, "tau_model": excerpt.tau_model, "tau_spring": excerpt.tau_spring,
+        "residual_std": excerpt.residual_std,
     }  # fmt: skip
     return {name: _short(values) for name, values in signals.items()}
 
@@ -371,4 +375,6 @@ def _excerpt_from_dict(record: Mapping[str, Any], robot: Robot) -> Excerpt:
     time = _array(record["time"], (samples,), "excerpt.time")
     motion = Motion(time, *(table(k) for k in ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")))
     spring = np.array(record["tau_spring"], dtype=np.float64).reshape(samples, len(robot.elastic_indices))
-    return Excerpt(motion, table("tau_motor"), table("tau_std"), table("tau_model"), spring)
+    # files of earlier versions have the scatter of the torque alone
+    scatter = table("residual_std" if "residual_std" in record else "tau_std")
+    return Excerpt(motion, table("tau_motor"), table("tau_std"), table("tau_model"), spring, scatter)

@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from sea_ident.estimation import Agreement
 from sea_ident.exceptions import OutputError, SeaIdentWarning
 from sea_ident.report import write_report
 from sea_ident.report.content import Content
@@ -122,13 +123,24 @@ def test_findings_name_what_is_poor_and_what_is_off(leg_model):
 
 
 def test_findings_say_which_joint_is_not_explained(leg_model):
-    fit = replace(leg_model.fit, rms_residual=np.array([0.5, 0.1, 0.1]), noise_std=np.array([0.3, 0.1, 0.1]))
+    agreement = Agreement(np.array([0.5, 0.1, 0.1]), np.array([0.3, 0.1, 0.1]), np.array([0.95, 0.95, 1.0]))
+    rms = np.array([0.5, np.sqrt(0.95 * 0.1**2 + 0.05 * 0.4**2), 0.1])
+    fit = replace(leg_model.fit, rms_residual=rms, agreement=agreement)
     findings = Findings().context(Content(replace(leg_model, fit=fit)))["findings"]
     levels = {f.head: f.level for f in findings}
     assert levels["hip"] == "warn"
     assert levels["knee"] == "good"
     # sqrt(0.5^2 - 0.3^2) = 0.4
-    assert "0.4 N m is not explained" in next(f.text for f in findings if f.head == "hip")
+    texts = {f.head: f.text for f in findings}
+    assert "0.4 N m is not explained" in texts["hip"]
+    assert "and 0.4 around them" in texts["knee"]
+    assert "reversals" not in texts["ankle"]
+
+
+def test_findings_say_where_the_noise_is_not_known(leg_model):
+    fit = replace(leg_model.fit, agreement=None)
+    findings = Findings().context(Content(replace(leg_model, fit=fit)))["findings"]
+    assert all("its noise is not known" in f.text for f in findings if f.head in leg_model.robot.joint_names)
 
 
 def test_springs_give_the_reason_of_their_verdict(page_text, leg_model):
@@ -167,6 +179,7 @@ def test_a_model_without_data_has_a_report_too(leg_model, tmp_path):
         tau_std=none.tau_std[:0],
         tau_model=none.tau_model[:0],
         tau_spring=none.tau_spring[:0],
+        residual_std=none.residual_std[:0],
     )
     write_report(replace(leg_model, excerpt=empty), tmp_path / "r.html")
     page = Page((tmp_path / "r.html").read_text())

@@ -7,9 +7,7 @@ import typer
 
 from sea_ident.cli.inputs import read_columns
 from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, RecordingFile, ReportFile
-from sea_ident.cli.output import check_targets, emit, note, progress
-
-STEPS = 100
+from sea_ident.cli.output import SHARES, by_share, check_targets, emit, note, progress
 
 
 def diagnose(
@@ -44,14 +42,14 @@ def diagnose(
     columns = read_columns(column)
     measured = read_recording(recording, columns=columns)
     other = None if holdout is None else read_recording(holdout, columns=columns)
-    with progress("diagnosing", STEPS) as tell:
+    with progress("diagnosing", SHARES) as tell:
         found = run(
             loaded,
             measured,
             holdout=other,
             reference=earlier,
             period=period,
-            progress=lambda what, share: tell(round(STEPS * share), what),
+            progress=by_share(tell),
         )
     found.save(out)
     files = [str(out)]

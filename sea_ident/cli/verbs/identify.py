@@ -18,7 +18,7 @@ from sea_ident.cli.options import (
     RobotSource,
     UnknownZeros,
 )
-from sea_ident.cli.output import check_targets, emit, progress
+from sea_ident.cli.output import SHARES, by_share, check_targets, emit, progress
 
 
 def identify(
@@ -42,13 +42,14 @@ def identify(
     loaded = read_robot(robot, annotation, joints)
     effects = read_effects(loaded, add)
     measured = read_recording(recording, columns=read_columns(column))
-    with progress("identifying"):
+    with progress("identifying", SHARES) as tell:
         model = run(
             loaded,
             measured,
             effects=effects,
             period=period,
             unknown_zero=split_names(unknown_zero),
+            progress=by_share(tell),
         )
     model.save(out)
     files = [str(out)]

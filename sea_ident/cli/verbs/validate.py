@@ -2,7 +2,7 @@
 
 from sea_ident.cli.inputs import read_columns
 from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, RecordingFile
-from sea_ident.cli.output import emit, progress
+from sea_ident.cli.output import SHARES, by_share, emit, progress
 
 
 def validate(
@@ -22,6 +22,6 @@ def validate(
 
     loaded = read_model(model)
     measured = read_recording(recording, columns=read_columns(column))
-    with progress("predicting"):
-        result = run(loaded, measured, period=period)
+    with progress("predicting", SHARES) as tell:
+        result = run(loaded, measured, period=period, progress=by_share(tell))
     emit(result.to_dict(), result.summary(), as_json=as_json)

@@ -9,12 +9,16 @@ from sea_ident.estimation import Model, Verdict
 from sea_ident.report.content import Content
 from sea_ident.report.section import ModelSection
 from sea_ident.report.sections.parameters import POOR_PERCENT, parameter_rows
+from sea_ident.robot import Joint
 
 NAMED = 8
 """Parameters that one sentence names."""
 
-NEAR_NOISE = 1.5
-"""A residual within this many times its noise is called explained."""
+WHOLE = 0.995
+"""Share of the samples from which on all of them count."""
+
+EXACT = 1e-6
+"""A gap below this share of the torque is rounding."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class Findings(ModelSection):
     def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """Fit, parameters, springs and warnings."""
         fit = model.fit
-        findings = [*_fit(model), *_parameters(model), *_springs(model), *_validations(content)]
+        findings = [*_fit(model), *_parameters(model), *_springs(model), *_validations(model.robot.joints, content)]
         findings.extend(Finding("warn", "Warning", text) for text in model.warnings)
         share = fit.rms_residual / np.maximum(fit.rms_torque, 1e-300)
         tiles = [
@@ -51,25 +55,38 @@ class Findings(ModelSection):
 
 def _fit(model: Model) -> list[Finding]:
     fit = model.fit
-    found = []
-    for i, joint in enumerate(model.robot.joints):
-        rms, noise, torque = float(fit.rms_residual[i]), float(fit.noise_std[i]), float(fit.rms_torque[i])
-        share = 100.0 * rms / max(torque, 1e-300)
-        text = f"the model leaves {rms:.3g} of {torque:.3g} {joint.torque_unit} rms ({share:.2g} %)"
-        if fit.periods < 2 or noise <= 0.0:
-            found.append(Finding("", joint.name, f"{text}; with one period its noise is not known."))
-        elif rms <= NEAR_NOISE * noise:
-            found.append(Finding("good", joint.name, f"{text}; noise alone is {noise:.3g}: nothing left to explain."))
-        else:
-            beyond = float(np.sqrt(max(rms**2 - noise**2, 0.0)))
-            found.append(
-                Finding(
-                    "warn",
-                    joint.name,
-                    f"{text}; noise alone is {noise:.3g}, so {beyond:.3g} {joint.torque_unit} is not explained.",
-                )
+    found = [_agreement(model, i) for i in range(model.robot.n)]
+    if fit.agreement is not None and np.any(fit.agreement.share < WHOLE):
+        found.append(
+            Finding(
+                "",
+                "Around reversals",
+                "friction may be anything up to breakaway and differ from pass to pass; no function of velocity can be "
+                "right there, so those samples do not count in the judgement.",
             )
+        )
     return found
+
+
+def _agreement(model: Model, index: int) -> Finding:
+    """Whether the residual of a joint is more than its noise away from reversals."""
+    fit, joint = model.fit, model.robot.joints[index]
+    rms, torque, unit = float(fit.rms_residual[index]), float(fit.rms_torque[index]), joint.torque_unit
+    text = f"the model leaves {rms:.3g} of {torque:.3g} {unit} rms ({100.0 * rms / max(torque, 1e-300):.2g} %)"
+    if fit.agreement is None:
+        return Finding("", joint.name, f"{text}; with one period its noise is not known.")
+    away, noise, share = fit.agreement.rms[index], fit.agreement.noise[index], fit.agreement.share[index]
+    if share < WHOLE:
+        around = fit.agreement.around_reversals(fit.rms_residual)[index]
+        text += (
+            f": {away:.3g} away from reversals ({100.0 * share:.0f} % of the samples), where noise alone is {noise:.3g}"
+            f", and {around:.3g} around them."
+        )
+    else:
+        text += f"; noise alone is {noise:.3g}."
+    if fit.agreement.within_noise[index] or fit.agreement.gap[index] < EXACT * torque:
+        return Finding("good", joint.name, f"{text} Nothing stands out of the noise.")
+    return Finding("warn", joint.name, f"{text} {fit.agreement.gap[index]:.3g} {unit} is not explained.")
 
 
 def _parameters(model: Model) -> list[Finding]:
@@ -124,16 +141,24 @@ def _springs(model: Model) -> list[Finding]:
     ]
 
 
-def _validations(content: Content) -> list[Finding]:
+def _validations(joints: tuple[Joint, ...], content: Content) -> list[Finding]:
     found = []
     for validation in content.validations:
         worst = int(np.argmax(validation.nrms))
-        found.append(
-            Finding(
-                "",
-                "Prediction",
-                f"{validation.recording}, which was not used: at worst {100 * validation.nrms[worst]:.2g} % of the "
-                f"torque, at the {validation.joint_names[worst]}.",
-            )
+        text = (
+            f"{validation.recording}, which was not used: at worst {100 * validation.nrms[worst]:.2g} % of the "
+            f"torque, at the {validation.joint_names[worst]}"
         )
+        away = validation.agreement
+        level = ""
+        if away is not None:
+            beyond = [
+                f"{joint.name} {away.gap[i]:.2g} {joint.torque_unit}"
+                for i, joint in enumerate(joints)
+                if not away.within_noise[i]
+            ]
+            level = "warn" if beyond else "good"
+            text += "; away from reversals "
+            text += f"beyond the noise: {', '.join(beyond)}" if beyond else "nothing stands out of the noise"
+        found.append(Finding(level, "Prediction", f"{text}."))
     return found

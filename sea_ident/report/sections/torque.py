@@ -23,8 +23,8 @@ class Torque(ModelSection):
         if not len(excerpt.motion):
             return None
         time = excerpt.motion.time - excerpt.motion.time[0]
-        spread = excerpt.tau_std / np.sqrt(model.fit.periods)
-        figures = []
+        spread = excerpt.residual_std / np.sqrt(model.fit.periods)
+        figures, away = [], model.fit.agreement
         for i, joint in enumerate(model.robot.joints):
             measured, predicted = excerpt.tau_motor[:, i], excerpt.tau_model[:, i]
             residual = measured - predicted
@@ -43,7 +43,8 @@ class Torque(ModelSection):
                     "residual": lower.svg(),
                     "legend": Chart([*marks, *lower.marks], "", "").legend(),
                     "rms": model.fit.rms_residual[i],
-                    "noise": model.fit.noise_std[i],
+                    "noise": model.fit.noise_std[i] if away is None else away.noise[i],
+                    "away": None if away is None else away.rms[i],
                     "share": 100.0 * model.fit.rms_residual[i] / max(model.fit.rms_torque[i], 1e-300),
                     "unit": joint.torque_unit,
                     "joint": joint.name,

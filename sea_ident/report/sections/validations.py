@@ -25,7 +25,7 @@ class Validations(ModelSection):
         groups = []
         for number, validation in enumerate(content.validations):
             time = validation.processed.motion.time - validation.processed.motion.time[0]
-            figures, rows = [], []
+            figures, rows, away = [], [], validation.agreement
             for i, joint in enumerate(joints):
                 measured, predicted = validation.processed.tau_motor[:, i], validation.predicted[:, i]
                 chart = Chart(
@@ -41,7 +41,8 @@ class Validations(ModelSection):
                     (
                         joint.name,
                         validation.rms[i],
-                        validation.noise_std[i],
+                        validation.noise_std[i] if away is None else away.noise[i],
+                        None if away is None else away.rms[i],
                         100 * validation.nrms[i],
                         joint.torque_unit,
                     )
