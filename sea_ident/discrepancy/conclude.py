@@ -103,6 +103,13 @@ def conclude(
     )
 
 
+def unexplained(confirmed: Confirmed) -> bool:
+    """Whether more is left than may be left as what no model has."""
+    if lack_of_fit(confirmed.bench, confirmed.final)[2] >= LACK_LEVEL:
+        return False
+    return remainder_share(confirmed.bench, confirmed.final) > LARGEST_REMAINDER
+
+
 def verdict_of(
     bench: Bench,
     missing: list[MissingEffect],

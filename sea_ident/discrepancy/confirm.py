@@ -1,11 +1,13 @@
-"""Whether what was found holds away from the reversals too."""
+"""Whether what was found holds away from the reversals too, and what can be found only there."""
 
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import away_from_reversals
 from sea_ident.discrepancy.judge import significance, torque_change
-from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, without
+from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
 
@@ -29,6 +31,16 @@ class Confirmed:
         """The same with less found."""
         final = settle_again(self.bench, selection.final.fit) if selection.added else self.start
         return replace(self, selection=selection, final=final)
+
+
+FAR = 6
+"""How many times the usual is left out around reversals where the search is repeated without what is slow."""
+
+MOST_LEFT_OUT = 0.6
+"""Share of the samples of an equation beyond which too little is left to search [-]."""
+
+RESOLVED = 0.5
+"""Share of the misfit that the repeated search may leave of what the first left there, to be the better one [-]."""
 
 
 def confirm(bench: Bench, selection: Selection) -> Confirmed:
@@ -56,3 +68,28 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
             weak.append(k)
     found = Confirmed(selection, away, start, final)
     return found.less(without(bench, selection, weak)) if weak else found
+
+
+def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
+    """Search again without the samples in which a motor hardly moves.
+
+    Where a motor lingers at a speed that is hardly more than its noise, friction depends on that speed so steeply that
+    no model of the mean is right there. What that leaves can hide an effect that the rest of the motion shows plainly.
+
+    Args:
+        bench: the recording.
+        confirmed: what was found with these samples, and does not explain the recording.
+
+    Returns:
+        What is found without them; None where it explains the rest no better.
+    """
+    data = away_from_reversals(bench.data, FAR)
+    if np.any(np.mean(data.left_out, axis=0) > MOST_LEFT_OUT):
+        return None
+    far = Bench(data, bench.effects)
+    first = settle_again(far, confirmed.final.fit).fit
+    found = search(far, bench.effects)
+    fit = found.final.fit
+    if not found.added or fit.statistic / fit.dof > RESOLVED * first.statistic / first.dof:
+        return None
+    return Confirmed(found, far, found.start, found.final)

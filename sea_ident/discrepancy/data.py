@@ -82,6 +82,7 @@ class PeriodData:
         harmonics: H, harmonics that are compared.
         left_out: (N, E) samples of an equation that say nothing about a model.
         warnings: what a user should know.
+        caution: how many times the usual is left out around reversals.
     """
 
     robot: Robot
@@ -96,6 +97,7 @@ class PeriodData:
     harmonics: int
     left_out: NDArray[np.bool_]
     warnings: tuple[str, ...] = ()
+    caution: int = 1
 
     @property
     def periods(self) -> int:
@@ -244,20 +246,24 @@ def around_reversal(speed: FloatArray, samples: int = REVERSAL_SAMPLES) -> NDArr
     return left_out
 
 
-def away_from_reversals(data: PeriodData) -> PeriodData:
-    """The same periods with twice as much left out around every reversal.
+def away_from_reversals(data: PeriodData, caution: int = 2) -> PeriodData:
+    """The same periods with more left out around every reversal.
 
     What is said of a model must hold there too: at reversals, the mean of what differs from pass to pass, and the
     time of a sample within its interval, look like small effects of friction and of delay.
+
+    Args:
+        data: the periods.
+        caution: how many times the usual is left out.
     """
     wide = around_reversals(
         data.motion,
         data.equations,
         data.period_motions,
-        samples=2 * REVERSAL_SAMPLES,
-        uncertain=2.0 * UNCERTAIN_SIGN,
+        samples=caution * REVERSAL_SAMPLES,
+        uncertain=caution * UNCERTAIN_SIGN,
     )
-    return replace(data, left_out=data.left_out | wide)
+    return replace(data, left_out=data.left_out | wide, caution=caution)
 
 
 def free_samples(left_out: NDArray[np.bool_], harmonics: int) -> NDArray[np.complex128]:

@@ -4,13 +4,13 @@ import warnings as python_warnings
 from collections.abc import Callable
 from dataclasses import replace
 
-from sea_ident.discrepancy import assess, check
+from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
-from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude
-from sea_ident.discrepancy.confirm import confirm
+from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
+from sea_ident.discrepancy.confirm import confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
@@ -101,6 +101,13 @@ def diagnose(
     else:
         selection = search(bench, bench.effects)
     confirmed = confirm(bench, selection)
+    slow_notes: tuple[str, ...] = ()
+    if basic is None and data.periods >= FEWEST_TO_SEARCH and unexplained(confirmed):
+        tell("searching without what is slow", 0.35)
+        second = without_the_slow(bench, confirmed)
+        if second is not None:
+            bench, confirmed = second.bench, second
+            slow_notes = (words.slow_samples(bench.data),)
     selection = confirmed.selection
     tell("comparing the periods", 0.5)
     trends = compare_periods(confirmed.bench, confirmed.final.fit, confirmed.final.noise, temperature)
@@ -120,7 +127,7 @@ def diagnose(
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    notes = replace(notes, warnings=(*notes.warnings, *basic_notes, *held_notes, *forward.notes))
+    notes = replace(notes, warnings=(*notes.warnings, *slow_notes, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes)
     diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from sea_ident.discrepancy import assess, check
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import PeriodData, period_data, wide_processing
+from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.search import Selection
@@ -78,6 +78,8 @@ def held_out(
     if findings.fatal or data.periods < 2:
         warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")
         return other_periods(bench, selection), tuple(warnings)
+    if bench.data.caution > data.caution:
+        data = away_from_reversals(data, bench.data.caution)
     found = tried(Bench(data, bench.effects), selection, processed.source)
     return replace(found, processed=processed, recording=holdout), tuple(warnings)
 

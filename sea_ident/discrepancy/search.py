@@ -21,7 +21,7 @@ from sea_ident.discrepancy.judge import (
     torque_change,
 )
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.settle import Settled, settle, settle_again
+from sea_ident.discrepancy.settle import FAR, Settled, settle, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 
@@ -147,7 +147,7 @@ def _next(
     accepted: list[tuple[float, Fit, float]] = []
     periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
     most = 0.0
-    for candidate in of_every_kind(worth, FINALISTS):
+    for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most:
             continue
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters)
@@ -199,11 +199,16 @@ def refitted(
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
     fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
     best = min(fits, key=lambda fit: fit.statistic)
+    if isinstance(effect, SignalEffect) and best.statistic > FAR * best.dof:
+        # the model that had to do without it may be too far off to begin from
+        none = replace(effect, **{amount.name: 0.0 for amount in effect.amounts})  # type: ignore[arg-type]
+        fresh = bench.refine((*before, none, *after), noise, only=len(bench.effects))
+        best = min(best, fresh, key=lambda fit: fit.statistic)
     return with_sharp_edges(bench, best, noise, len(before))
 
 
-def of_every_kind(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
-    """The first candidates, and the first of every side of the model that is not among them.
+def of_every_kind(candidates: Sequence[Candidate], count: int, joint: str | None = None) -> list[Candidate]:
+    """The first candidates, the first of every side of the model that is not among them, and the signals of a joint.
 
     A first step along a tangent flatters what has many shapes, and says little about an effect in the chain of signals
     whose amount is not small.
@@ -214,6 +219,8 @@ def of_every_kind(candidates: Sequence[Candidate], count: int) -> list[Candidate
         if kind_of(candidate.effect) not in kinds:
             chosen.append(candidate)
             kinds.add(kind_of(candidate.effect))
+        elif joint is not None and candidate.effect.joint == joint and is_signal(candidate.effect):
+            chosen.append(candidate)
     return chosen
 
 
@@ -234,11 +241,7 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
         own = effect_key(fit.effects[position])
         best = fit
         rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
-        tried = of_every_kind(rivals, CHALLENGERS)
-        # what a first step along a tangent says of an effect in the chain of signals is not much
-        joint = fit.effects[position].joint
-        tried += [c for c in rivals if is_signal(c.effect) and c.effect.joint == joint and c not in tried]
-        for candidate in tried:
+        for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
             if candidate.gain < 0.5 * (reduced.statistic - fit.statistic) and not is_signal(candidate.effect):
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)

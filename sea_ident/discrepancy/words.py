@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.trend import TrendTest
@@ -53,6 +54,18 @@ def paragraph(facts: Facts) -> str:
     if facts.verdict is Verdict.SUSPECT:
         parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
     return " ".join(parts)
+
+
+def slow_samples(data: PeriodData) -> str:
+    """That samples in which a motor hardly moves were left out, and how many."""
+    shares = data.left_out.mean(axis=0)
+    worst = int(shares.argmax())
+    equation = data.equations[worst]
+    return (
+        f"samples in which a joint hardly moves were left out, up to {shares[worst]:.0%} ({equation.kind} of "
+        f"{equation.joint}): there the torque of friction follows from a velocity that is hardly more than its noise. "
+        "Let the joints pass zero velocity faster"
+    )
 
 
 def _gap_sentence(gap: Gap) -> str:
