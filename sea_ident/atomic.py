@@ -1,13 +1,20 @@
 """Writing that is complete or has not happened: a temporary sibling, then one rename."""
 
+import hashlib
 import os
+import platform
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from sea_ident.exceptions import OutputError
+
+LONGEST = 100
+"""Characters of a name that its temporary sibling keeps."""
 
 
 @contextmanager
@@ -67,7 +74,69 @@ def atomic_directory(path: str | Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
+@contextmanager
+def scratch_folder(target: str | Path) -> Iterator[Path]:
+    """A temporary folder on the disk of `target`, gone afterwards.
+
+    Args:
+        target: what it is needed for; it stands beside this.
+
+    Yields:
+        The folder.
+
+    Raises:
+        OutputError: the folder of `target` does not exist.
+    """
+    folder = _sibling(Path(target).with_suffix(""))
+    try:
+        folder.mkdir()
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+_OWN = re.compile(r"\..+\.sea-ident-([0-9a-f]{8})-(\d+)-[0-9a-f]{12}(\.\w+)?")
+
+
 def _sibling(target: Path) -> Path:
     if not target.parent.is_dir():
         raise OutputError(f"{target}: the folder {target.parent} does not exist; make it first")
-    return target.with_name(f".{target.stem}.{secrets.token_hex(6)}{target.suffix}")
+    _remove_stale(target.parent.resolve())
+    own = f"sea-ident-{_machine()}-{os.getpid()}-{secrets.token_hex(6)}"
+    return target.with_name(f".{target.stem.lstrip('.')[:LONGEST]}.{own}{target.suffix}")
+
+
+@cache
+def _remove_stale(folder: Path) -> None:
+    """Remove, once for a folder, what processes of this machine that were killed have left there half-written."""
+    if os.name != "posix":
+        return
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            found = _OWN.fullmatch(entry.name)
+            if found is None or found[1] != _machine() or _alive(int(found[2])):
+                continue
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                with suppress(OSError):
+                    os.unlink(entry.path)
+
+
+@cache
+def _machine() -> str:
+    """Stands for this machine and, inside a container, its process numbers: folders can be shared."""
+    numbers = ""
+    with suppress(OSError):
+        numbers = str(os.stat("/proc/self/ns/pid").st_ino)
+    return hashlib.sha256(f"{platform.node()} {numbers}".encode()).hexdigest()[:8]
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True  # somebody else's
+    return True

@@ -12,6 +12,7 @@ from typing import Any
 
 from joblib import Parallel, delayed
 from joblib.externals.loky.process_executor import BrokenProcessPool
+from joblib.parallel import BACKENDS, get_active_backend
 
 import sea_ident
 from sea_ident.atomic import atomic_file
@@ -21,6 +22,9 @@ from sea_ident.recordings import ColumnSource, read_recording
 from sea_ident.recordings.columns import as_source
 from sea_ident.recordings.files import SUFFIXES
 from sea_ident.robot import Robot, robot_from_text
+
+IDLE = 20.0
+"""Time [s] after which a worker process without work ends; those of a killed run do so too, within a minute."""
 
 MODELS, ROWS, TABLE = "models", "rows", "table.csv"
 
@@ -203,7 +207,7 @@ def _outcomes(tasks: Sequence[_Task], jobs: int) -> Iterator[_Outcome]:
     """As they come. Where one brings its worker process down, those that were lost are done again, each alone."""
     finished: set[str] = set()
     try:
-        for outcome in Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(task) for task in tasks):
+        for outcome in _parallel(jobs)(delayed(_one)(task) for task in tasks):
             finished.add(outcome.path)
             yield outcome
     except BrokenProcessPool:
@@ -211,9 +215,15 @@ def _outcomes(tasks: Sequence[_Task], jobs: int) -> Iterator[_Outcome]:
             if task.path in finished:
                 continue
             try:
-                yield from Parallel(n_jobs=2, backend="loky")([delayed(_one)(task)])
+                yield from Parallel(n_jobs=2, backend="loky", idle_worker_timeout=IDLE)([delayed(_one)(task)])
             except BrokenProcessPool:
                 yield _Outcome(task.path, None, "its worker process ended without an answer (out of memory?)", ())
+
+
+def _parallel(jobs: int) -> Any:
+    """What hands out the work, in the backend that the user has chosen."""
+    own = type(get_active_backend()[0]) is BACKENDS["loky"]
+    return Parallel(n_jobs=jobs, return_as="generator_unordered", **({"idle_worker_timeout": IDLE} if own else {}))
 
 
 def _one(task: _Task) -> _Outcome:

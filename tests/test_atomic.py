@@ -1,4 +1,7 @@
 import os
+import re
+import subprocess
+import sys
 
 import pytest
 
@@ -17,6 +20,41 @@ def test_the_temporary_file_itself_becomes_the_file(tmp_path):
     assert path.read_text() == "new"
     assert path.stat().st_ino == written
     assert os.listdir(tmp_path) == ["x.csv"]
+
+
+KILLED = """
+import os, signal, sys
+from sea_ident.atomic import atomic_directory, atomic_file, scratch_folder
+with atomic_file(sys.argv[1] + "/a.csv") as a, atomic_directory(sys.argv[1] + "/b") as b, scratch_folder(sys.argv[1]):
+    a.write_text("half")
+    b.mkdir()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_the_next_run_removes_what_a_killed_one_left(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    subprocess.run([sys.executable, "-c", KILLED, str(folder)], check=False)
+    left = sorted(os.listdir(folder))
+    assert [name.partition(".sea-ident-")[0] for name in left] == [".a", ".b"]
+    assert len(os.listdir(tmp_path)) == 2
+    # what is not ours, of another machine, of a process that lives, or only looks alike
+    ours = re.sub(r"-\d+-([0-9a-f]{12})", rf"-{os.getppid()}-\1", left[0])
+    other = re.sub(r"sea-ident-[0-9a-f]{8}", "sea-ident-00000000", left[0])
+    kept = {".a.csv", "a.csv.bak", ours, other, f"x{left[0]}"}
+    for name in kept:
+        (folder / name).write_text("mine")
+    with atomic_file(folder / "new.csv") as temporary:
+        temporary.write_text("new")
+    assert set(os.listdir(folder)) == {"new.csv", *kept}
+
+
+def test_the_temporary_name_of_a_long_name_is_no_longer(tmp_path):
+    path = tmp_path / ("n" * 240 + ".csv")
+    with atomic_file(path) as temporary:
+        temporary.write_text("new")
+    assert path.read_text() == "new"
 
 
 def fail(context, name, error):

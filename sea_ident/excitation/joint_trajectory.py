@@ -2,13 +2,12 @@
 
 import json
 import os
-import tempfile
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 
-from sea_ident.atomic import atomic_directory, atomic_file
+from sea_ident.atomic import atomic_directory, atomic_file, scratch_folder
 from sea_ident.exceptions import ExcitationError, MissingExtraError, OutputError
 from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.trajectory import sample_trajectory
@@ -97,8 +96,8 @@ def write_trajectory_bag(
             with atomic_directory(path) as folder:
                 _write_bag(folder, storage, topic, store, message)
             return
-        with atomic_file(path) as temporary, tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder_name:
-            bag = Path(folder_name) / "bag"
+        with atomic_file(path) as temporary, scratch_folder(path) as folder:
+            bag = folder / "bag"
             _write_bag(bag, kind, topic, store, message)
             os.replace(bag / f"bag{path.suffix.lower()}", temporary)
     except OutputError as error:

@@ -1,13 +1,13 @@
 """Writing recordings as ROS 1 bags, ROS 2 bags (MCAP or SQLite in a folder) and single MCAP or SQLite files."""
 
 import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from sea_ident.atomic import scratch_folder
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings.naming import split_name
 from sea_ident.recordings.recording import Recording
@@ -135,6 +135,6 @@ def write_sqlite_file(recording: Recording, path: Path) -> None:
 
 
 def _write_single(recording: Recording, path: Path, storage: Storage, suffix: str) -> None:
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
-        write_ros2_bag(recording, Path(folder) / "bag", storage)
-        os.replace(Path(folder) / "bag" / f"bag{suffix}", path)
+    with scratch_folder(path) as folder:
+        write_ros2_bag(recording, folder / "bag", storage)
+        os.replace(folder / "bag" / f"bag{suffix}", path)
