@@ -13,11 +13,18 @@ from sea_ident.discrepancy.linear import off, solve, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
-from sea_ident.effects import Column, Effect
+from sea_ident.discrepancy.whitening import Whitening
+from sea_ident.effects import Effect
 from sea_ident.regressor import prior_parameters
 
 MOST_FIT_STEPS = 10
 """Largest number of steps of a fit; a model that is right needs two."""
+
+LEAST_STIFFNESS = 0.02
+"""Share of the stiffness of the first fit below which that of another no longer scales its link equation."""
+
+WHITENINGS_KEPT = 3
+"""Noise floors of which whitened columns are kept."""
 
 STANDS_STILL = 1e-3
 """A step of the shapes that takes less than this share of the excess was the last."""
@@ -40,7 +47,7 @@ class Bench(Tangents):
         self._target = spectrum(data.target(data.tau_motor), data.harmonics)
         self._left_out = data.left_out
         self._free = free_samples(data.left_out, data.harmonics)
-        self._free_basis: tuple[NoiseFloor | None, FloatArray] | None = None
+        self._whitenings: list[tuple[NoiseFloor | None, Whitening]] = []
         self._periods = Periods(data)
 
     def release(self, effects: Sequence[Effect]) -> None:
@@ -54,7 +61,7 @@ class Bench(Tangents):
                     if equation.index == turning[0] and equation.kind is not EquationKind.LINK:
                         left_out[:, e] |= rows
         if np.any(left_out != self._left_out):
-            self._left_out, self._free_basis = left_out, None
+            self._left_out, self._whitenings = left_out, []
             self._free = free_samples(left_out, self.data.harmonics)
 
     def predicted(self, effects: Sequence[Effect], parameters: Mapping[str, float]) -> Fit:
@@ -94,53 +101,71 @@ class Bench(Tangents):
             The fit.
         """
         effects = tuple(effects)
-        columns, design, whitener = self.labels(effects), self.design(effects), self.whitener(noise)
+        columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
         target = self._target if known is None else self._target - known
-        free = self.free_basis(noise)
+        parts = whitening.design(effects)
+        whole = self._whole(whitening) if known is None else whitening.in_parts(target)
+        slopes = self.stiffness_slopes(columns, design)
         values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
             start = self.fit(effects, None, tangents=False).parameters
         if start is not None:
             values = np.array([start.get(column.name, 0.0) for column in columns])
-        cost, best = np.inf, None
-        step = np.zeros(0)
-        for _ in range(MOST_FIT_STEPS if noise is not None else 1):
-            residual = target - design @ values
-            scale = np.ones(len(self.data.equations)) if noise is None else self.link_scale(columns, design, values)
-            whitened = off(free, whiten(whitener, residual * scale))
-            new_cost = float(whitened @ whitened)
-            if best is not None and new_cost > cost * (1.0 + 1e-9):
-                step *= 0.3
-                values = best[0] + step
-                continue
-            converged = best is not None and cost - new_cost < 1e-3 + 1e-6 * new_cost
-            cost, best = new_cost, (values, residual, scale, whitened)
-            if converged:
-                break
-            scaled = self._scaled_columns(columns, values, design, residual, scale, noise)
-            step = solve(off(free, whiten(whitener, scaled)), whitened)[0]
-            values = values + step
+        scale = np.ones(len(self.data.equations))
         if noise is None:
-            residual, scale = target - design @ values, np.ones(len(self.data.equations))
-            whitened = off(free, whiten(whitener, residual))
+            values = values + solve(whitening.scaled(parts, scale), whitening.scaled(whole - parts @ values, scale))[0]
         else:
-            assert best is not None
-            values, residual, scale, whitened = best
-        directions = self._scaled_columns(columns, values, design, residual, scale, noise)
+            values = self._descend(parts, whole, whitening, slopes, values)
+            scale = self._link_scale(slopes @ values)
+        left = whole - parts @ values
+        whitened = whitening.scaled(left, scale)
+        residual = target - design @ values
+        if noise is None:
+            directions, spectra = whitening.scaled(parts, scale), design
+        else:
+            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
+            spectra = self.scaled(design, slopes, residual, scale, slopes @ values)
         shapes = free_shapes(effects) if tangents else ()
         if shapes:
-            stiffness = self.stiffness_slopes(columns, design) @ values
-            bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, stiffness)
-            directions = np.concatenate([directions, bent], axis=2)
-        _, basis, factor = solve(off(free, whiten(whitener, directions)), whitened)
-        basis = np.concatenate([free, basis], axis=1)
-        return Fit(effects, columns, values, residual, scale, whitened, basis, directions, factor, shapes)
+            bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, slopes @ values)
+            directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
+            spectra = np.concatenate([spectra, bent], axis=2)
+        _, basis, factor = solve(directions, whitened)
+        basis = np.concatenate([whitening.free, basis], axis=1)
+        return Fit(effects, columns, values, residual, scale, whitened, basis, spectra, factor, shapes)
 
-    def link_scale(self, columns: Sequence[Column], design: ComplexArray, values: FloatArray) -> FloatArray:
+    def _descend(
+        self, parts: FloatArray, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray
+    ) -> FloatArray:
+        """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness."""
+        cost, best, step = np.inf, values, np.zeros(len(values))
+        for _ in range(MOST_FIT_STEPS):
+            left = whole - parts @ values
+            scale = self._link_scale(slopes @ values)
+            whitened = whitening.scaled(left, scale)
+            new_cost = float(whitened @ whitened)
+            if new_cost > cost * (1.0 + 1e-9):
+                step = 0.3 * step
+                values = best + step
+                continue
+            converged = cost - new_cost < 1e-3 + 1e-6 * new_cost
+            cost, best = new_cost, values
+            if converged:
+                break
+            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
+            step = solve(flat, whitened)[0]
+            values = values + step
+        return best
+
+    def _link_scale(self, stiffness: FloatArray) -> FloatArray:
         """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
         first = self.first_stiffness
-        slopes = self.stiffness_slopes(columns, design) @ values
-        return np.where(first > 0.0, first / np.maximum(slopes, 0.02 * first + 1e-300), 1.0)
+        return np.where(first > 0.0, first / np.maximum(stiffness, LEAST_STIFFNESS * first + 1e-300), 1.0)
+
+    def _scaled_links(self, stiffness: FloatArray) -> list[int]:
+        """Link equations of which the scale follows the stiffness (E,)."""
+        first = self.first_stiffness
+        return [e for e in self._deflections if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
 
     @cached_property
     def first_stiffness(self) -> FloatArray:
@@ -153,20 +178,21 @@ class Bench(Tangents):
                 slopes[e] = max(slopes[e], 0.2 * known)
         return np.asarray(np.maximum(slopes, 0.0), dtype=np.float64)
 
-    def _scaled_columns(
+    def _flat_columns(
         self,
-        columns: Sequence[Column],
-        values: FloatArray,
-        design: ComplexArray,
-        residual: ComplexArray,
+        parts: FloatArray,
+        left: FloatArray,
+        whitening: Whitening,
+        slopes: FloatArray,
         scale: FloatArray,
-        noise: NoiseFloor | None,
-    ) -> ComplexArray:
-        """(H + 1, E, p) decrease of the scaled residual with every parameter."""
-        if noise is None:
-            return design * scale[:, None]
-        slopes = self.stiffness_slopes(columns, design)
-        return self.scaled(design, slopes, residual, scale, slopes @ values)
+        stiffness: FloatArray,
+    ) -> FloatArray:
+        """(M, p) whitened decrease of the scaled residual with every parameter: `scaled`, in parts."""
+        out = whitening.scaled(parts, scale)
+        for e in self._scaled_links(stiffness):
+            if np.any(slopes[e]):
+                out += scale[e] * np.outer(left[whitening.parts[e]], slopes[e] / stiffness[e])
+        return out
 
     def scaled(
         self, change: ComplexArray, slopes: FloatArray, residual: ComplexArray, scale: FloatArray, stiffness: FloatArray
@@ -184,8 +210,8 @@ class Bench(Tangents):
             (H + 1, E, k).
         """
         out = change * scale[:, None]
-        for e in self._deflections:
-            if self.first_stiffness[e] > 0.0 and stiffness[e] > 0.02 * self.first_stiffness[e]:
+        for e in self._scaled_links(stiffness):
+            if np.any(slopes[e]):
                 out[:, e] += scale[e] * np.outer(residual[:, e], slopes[e] / stiffness[e])
         return out
 
@@ -199,23 +225,35 @@ class Bench(Tangents):
         """The model that is diagnosed, all equations counting alike: no weight can pull its parameters to zero."""
         return self.fit(self.effects, None, tangents=False)
 
+    def whitening(self, noise: NoiseFloor | None) -> Whitening:
+        """A noise floor and the samples that are left out, applied to torques; the last ones are kept."""
+        for known, kept in self._whitenings:
+            if known is noise:
+                return kept
+        made = Whitening(self, self._plain_whitener() if noise is None else noise.whitener(), self._free)
+        self._whitenings = [*self._whitenings[1 - WHITENINGS_KEPT :], (noise, made)]
+        return made
+
+    def _whole(self, whitening: Whitening) -> FloatArray:
+        """(G, M) target in parts."""
+        if whitening.target is None:
+            whitening.target = whitening.in_parts(self._target)
+        return whitening.target
+
     def free_basis(self, noise: NoiseFloor | None) -> FloatArray:
         """(M, m) orthonormal basis of the samples that are left out, whitened."""
-        if self._free_basis is None or self._free_basis[0] is not noise:
-            flat = whiten(self.whitener(noise), self._free)
-            self._free_basis = (noise, solve(flat, np.zeros(len(flat)))[1])
-        return self._free_basis[1]
+        return self.whitening(noise).free
 
     def statistic(self, fit: Fit, noise: NoiseFloor) -> float:
         """Weighted sum of squares of the residual of a fit in another noise floor, without fitting again."""
-        left = off(self.free_basis(noise), whiten(noise.whitener(), fit.residual * fit.scale))
+        left = self.whitening(noise).flat(fit.residual * fit.scale)
         return float(left @ left)
 
     def clean_residual(self, fit: Fit, noise: NoiseFloor) -> ComplexArray:
         """(H + 1, E) residual of a fit without what the samples that are left out put into it [N m]."""
         if not self._free.shape[2]:
             return fit.residual
-        whitener = noise.whitener()
+        whitener = self.whitener(noise)
         free = whiten(whitener, self._free)
         norms = np.linalg.norm(free, axis=0)
         amounts = np.linalg.lstsq(free / norms, whiten(whitener, fit.residual * fit.scale), rcond=1e-8)[0] / norms
@@ -224,12 +262,14 @@ class Bench(Tangents):
 
     def whitener(self, noise: NoiseFloor | None) -> ComplexArray:
         """(H + 1, E, E) whitening of a noise floor."""
-        if noise is None:
-            power = np.sqrt(np.sum(np.abs(self._target) ** 2, axis=0))
-            typical = float(np.max(power))
-            scale = np.diag(1.0 / np.where(power > 0.0, power, typical)).astype(np.complex128)
-            return np.broadcast_to(scale, (self.data.harmonics + 1, *scale.shape))
-        return noise.whitener()
+        return self.whitening(noise).whitener
+
+    def _plain_whitener(self) -> ComplexArray:
+        """(H + 1, E, E) whitening without a noise floor: every equation in its own torque."""
+        power = np.sqrt(np.sum(np.abs(self._target) ** 2, axis=0))
+        typical = float(np.max(power))
+        scale = np.diag(1.0 / np.where(power > 0.0, power, typical)).astype(np.complex128)
+        return np.broadcast_to(scale, (self.data.harmonics + 1, *scale.shape))
 
     def refine(
         self,
@@ -267,10 +307,9 @@ class Bench(Tangents):
         shapes = tuple((k, shape) for k, shape in free_shapes(fit.effects) if k >= only)
         if not shapes:
             return None
-        whitener, free = self.whitener(noise), self.free_basis(noise)
         bent = self.tangents(fit.effects, fit.columns, fit.values, shapes)
         tangents = self.scaled(*bent, fit.residual, fit.scale, self.stiffness_of(fit))
-        directions = off(free, whiten(whitener, tangents))
+        directions = self.whitening(noise).flat(tangents)
         across = off(fit.basis, directions)
         strength = np.linalg.norm(across, axis=0)
         if not np.any(strength > 1e-9):
@@ -305,10 +344,9 @@ class Bench(Tangents):
         """Noise floor with the parameters of a fit."""
         residuals = self.period_residuals(fit)
         plain = noise_from_periods(residuals)
-        whitener = plain.whitener()
-        free = self.free_basis(plain)
-        taken = solve(off(free, whiten(whitener, fit.directions)), np.zeros(len(free)))[1]
-        return noise_beside_model(residuals, plain, np.concatenate([free, taken], axis=1))
+        whitening = self.whitening(plain)
+        taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
+        return noise_beside_model(residuals, plain, np.concatenate([whitening.free, taken], axis=1))
 
     @cached_property
     def torque_rms(self) -> FloatArray:

@@ -21,7 +21,7 @@ from sea_ident.discrepancy.judge import (
     torque_change,
 )
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.settle import FAR, Settled, settle, settle_again
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 
@@ -199,11 +199,6 @@ def refitted(
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
     fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
     best = min(fits, key=lambda fit: fit.statistic)
-    if isinstance(effect, SignalEffect) and best.statistic > FAR * best.dof:
-        # the model that had to do without it may be too far off to begin from
-        none = replace(effect, **{amount.name: 0.0 for amount in effect.amounts})  # type: ignore[arg-type]
-        fresh = bench.refine((*before, none, *after), noise, only=len(bench.effects))
-        best = min(best, fresh, key=lambda fit: fit.statistic)
     return with_sharp_edges(bench, best, noise, len(before))
 
 
