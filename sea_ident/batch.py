@@ -7,12 +7,14 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
+from threading import Thread
+from time import sleep
 from typing import Any
 
 from joblib import Parallel, delayed
 from joblib.externals.loky.process_executor import BrokenProcessPool
-from joblib.parallel import BACKENDS, get_active_backend
 
 import sea_ident
 from sea_ident.atomic import atomic_file
@@ -23,8 +25,8 @@ from sea_ident.recordings.columns import as_source
 from sea_ident.recordings.files import SUFFIXES
 from sea_ident.robot import Robot, robot_from_text
 
-IDLE = 20.0
-"""Time [s] after which a worker process without work ends; those of a killed run do so too, within a minute."""
+WATCH = 1.0
+"""Time [s] between two looks of a worker process at whether the run that it works for is still there."""
 
 MODELS, ROWS, TABLE = "models", "rows", "table.csv"
 
@@ -207,7 +209,7 @@ def _outcomes(tasks: Sequence[_Task], jobs: int) -> Iterator[_Outcome]:
     """As they come. Where one brings its worker process down, those that were lost are done again, each alone."""
     finished: set[str] = set()
     try:
-        for outcome in _parallel(jobs)(delayed(_one)(task) for task in tasks):
+        for outcome in Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(task) for task in tasks):
             finished.add(outcome.path)
             yield outcome
     except BrokenProcessPool:
@@ -215,20 +217,28 @@ def _outcomes(tasks: Sequence[_Task], jobs: int) -> Iterator[_Outcome]:
             if task.path in finished:
                 continue
             try:
-                yield from Parallel(n_jobs=2, backend="loky", idle_worker_timeout=IDLE)([delayed(_one)(task)])
+                yield from Parallel(n_jobs=2, backend="loky")([delayed(_one)(task)])
             except BrokenProcessPool:
                 yield _Outcome(task.path, None, "its worker process ended without an answer (out of memory?)", ())
 
 
-def _parallel(jobs: int) -> Any:
-    """What hands out the work, in the backend that the user has chosen."""
-    own = type(get_active_backend()[0]) is BACKENDS["loky"]
-    return Parallel(n_jobs=jobs, return_as="generator_unordered", **({"idle_worker_timeout": IDLE} if own else {}))
+@cache
+def _end_with(parent: int) -> None:
+    """Let this worker process end when its parent has gone: a killed run cannot tell its workers to stop."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(WATCH)
+        os._exit(1)
+
+    if os.getppid() == parent:
+        Thread(target=watch, daemon=True).start()
 
 
 def _one(task: _Task) -> _Outcome:
     """Identify one recording; every failure is an outcome, a defect of the library included."""
     if os.getpid() != task.parent:
+        _end_with(task.parent)
         # a worker of its own: what is warned of is in the outcome, and its standard error is nobody's
         warnings.simplefilter("ignore", SeaIdentWarning)
     try:

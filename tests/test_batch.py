@@ -115,6 +115,29 @@ def test_after_a_kill_the_rest_is_done_and_the_table_is_that_of_one_run(robot, f
     assert resumed.table.read_text() == whole.table.read_text()
 
 
+WORKER = """
+import os, time
+from sea_ident.batch import _end_with
+_end_with(os.getppid())
+print("at work", flush=True)
+time.sleep(120)
+"""
+RUN = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
+def test_workers_of_a_killed_run_end():
+    run = subprocess.Popen([sys.executable, "-c", RUN, WORKER], stdout=subprocess.PIPE)
+    assert run.stdout.readline() == b"at work\n"
+    run.kill()
+    run.wait()
+    # the pipe ends with the last process that could write to it
+    killed = time.monotonic()
+    assert run.stdout.read() == b""
+    run.stdout.close()
+    assert time.monotonic() - killed < 60.0
+
+
 def kill_worker(task):
     """A recording that brings its worker down, as the system does when memory ends."""
     if "robot1" in task.path:

@@ -26,7 +26,12 @@ AsJson: TypeAlias = Annotated[
 ]
 Seed: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 Period: TypeAlias = Annotated[
-    float | None, typer.Option("--period", metavar="S", help="Period of the motion [s]; not periodic without it.")
+    float | None,
+    typer.Option(
+        "--period",
+        metavar="S",
+        help="Period of the motion [s]. Default: found from the data, if they repeat themselves.",
+    ),
 ]
 AddedEffects: TypeAlias = Annotated[
     list[str] | None,
@@ -74,5 +79,5 @@ def _at_least_one_job(jobs: int) -> int:
 
 Jobs: TypeAlias = Annotated[
     int,
-    typer.Option("--jobs", help="Pieces of work at a time; -1: one per core.", callback=_at_least_one_job),
+    typer.Option("--jobs", help="How many to work on at a time; -1: one per core.", callback=_at_least_one_job),
 ]

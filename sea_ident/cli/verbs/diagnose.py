@@ -40,13 +40,11 @@ def diagnose(
     check_targets(out, model_out, report, inputs=(model, recording, holdout, reference))
     loaded, earlier = read_model(model), None if reference is None else read_model(reference)
     columns = read_columns(column)
-    measured = read_recording(recording, columns=columns)
-    other = None if holdout is None else read_recording(holdout, columns=columns)
-    with progress("diagnosing", SHARES) as tell:
+    with progress(f"reading {recording.name}", SHARES) as tell:
         found = run(
             loaded,
-            measured,
-            holdout=other,
+            read_recording(recording, columns=columns),
+            holdout=None if holdout is None else read_recording(holdout, columns=columns),
             reference=earlier,
             period=period,
             progress=by_share(tell),

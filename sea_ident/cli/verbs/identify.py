@@ -41,11 +41,11 @@ def identify(
     check_targets(out, report, inputs=(robot, annotation, recording))
     loaded = read_robot(robot, annotation, joints)
     effects = read_effects(loaded, add)
-    measured = read_recording(recording, columns=read_columns(column))
-    with progress("identifying", SHARES) as tell:
+    columns = read_columns(column)
+    with progress(f"reading {recording.name}", SHARES) as tell:
         model = run(
             loaded,
-            measured,
+            read_recording(recording, columns=columns),
             effects=effects,
             period=period,
             unknown_zero=split_names(unknown_zero),

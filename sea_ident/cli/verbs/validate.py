@@ -21,7 +21,7 @@ def validate(
     from sea_ident.validation import validate as run
 
     loaded = read_model(model)
-    measured = read_recording(recording, columns=read_columns(column))
-    with progress("predicting", SHARES) as tell:
-        result = run(loaded, measured, period=period, progress=by_share(tell))
+    columns = read_columns(column)
+    with progress(f"reading {recording.name}", SHARES) as tell:
+        result = run(loaded, read_recording(recording, columns=columns), period=period, progress=by_share(tell))
     emit(result.to_dict(), result.summary(), as_json=as_json)
