@@ -12,6 +12,7 @@ from sea_ident.estimation.estimators.weights import LEAST_REST
 from sea_ident.estimation.identify import identify
 from sea_ident.estimation.model import Model
 from sea_ident.estimation.observations import Observations, Rows, SpringSide
+from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.spring_result import SpringResult
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
@@ -139,8 +140,10 @@ class _System:
         inverse = np.linalg.inv(gram)
         residuals = self._residuals(values)
         centred = residuals - residuals.mean(axis=0)
-        white = np.stack([whitening.apply(part[:, :, None]).ravel() for part in centred])
-        influences = white @ flat @ inverse.T / scale / periods
+        # whitening is symmetric: done twice to the mean rows, it need not be done to the residuals
+        instruments = whitening.apply(whitening.apply(mean_table / scale))
+        scores = period_scores(centred, instruments, self.observations.processed.places)
+        influences = scores @ inverse.T / scale / periods
         return values, influences, inverse / np.outer(scale, scale)
 
     def _residuals(self, values: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects import JointEffect
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
+from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError
@@ -106,6 +107,7 @@ def springs_from(
             uncertainty,
             tuple(effect for effect in effects if effect.joint == name),
             tuple(len(effect.columns(robot)) for effect in effects if effect.joint == name),
+            processed.places,
         )
         result = _one_spring(data, name in unknown_zero)
         channels = processed.channels
@@ -143,6 +145,7 @@ class _SpringData:
     uncertainty: Uncertainty
     effects: tuple[JointEffect, ...] = ()
     widths: tuple[int, ...] = ()
+    places: tuple[int, ...] = (0,)
 
     def columns(self, motion: Motion, zero: float) -> FloatArray:
         """(N, 3 + k) columns of K1, K3, D and of the other effects."""
@@ -287,8 +290,9 @@ def _covariance(
         )
     periods = len(data.per_period)
     factor = periods / (periods - 1.0)
-    direct = np.array([inverse @ (tau - data.columns(motion, zero) @ law) for motion, tau in data.per_period])
-    direct = (direct - direct.mean(axis=0)) / periods
+    residuals = np.stack([tau - data.columns(motion, zero) @ law for motion, tau in data.per_period])
+    residuals -= residuals.mean(axis=0)
+    direct = period_scores(residuals[:, :, None], inverse.T[:, None, :], data.places) / periods
     if uncertainty.kind in (CovarianceKind.PERIODS, CovarianceKind.REMAINDER) and periods >= FEW_PERIODS:
         moves = direct + uncertainty.influences @ step.T
         rest = uncertainty.covariance - uncertainty.repeatability

@@ -10,6 +10,7 @@ from scipy import stats
 from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators import Estimate
 from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.period_scores import period_scores
 
 FEWEST_BLOCKS = 20
 """Smallest number of pieces of a period from which a covariance is estimated."""
@@ -104,7 +105,8 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
     residuals -= residuals.mean(axis=0)
     periods = len(residuals)
     drifted: tuple[str, ...] = ()
-    influences = np.einsum("pkn,knb->pb", residuals, estimate.instruments) @ estimate.inverse.T / periods
+    scores = period_scores(residuals, estimate.instruments, observations.processed.places)
+    influences = scores @ estimate.inverse.T / periods
     if periods >= FEW_PERIODS:
         covariance = influences.T @ influences * (periods / (periods - 1.0))
         kind, freedom = CovarianceKind.PERIODS, periods - 1.0

@@ -7,9 +7,20 @@ from scipy.interpolate import make_interp_spline
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
+from sea_ident.processing.variance import noise_from_curvature
 
 REPEATS_WITHIN = 0.02
-"""Mean square difference of two periods, as a share of twice the variance, up to which a lag counts as a period."""
+"""Mean square difference of two periods, as a share of twice the variance, up to which a lag can be a period."""
+
+ALIKE = 0.5 * 0.01**2
+"""The same where repeats differ by a hundredth of the motion: machines that follow a periodic reference stay below."""
+
+NOISE = 9.0
+"""Mean square difference over that of the noise up to which noise explains it."""
+
+GROWTH = 2.5
+"""Growth of the mean square difference over more periods up to which it does not grow: what repeats nearly, as two
+frequencies that hardly fit together, differs twice as much after two periods, so four times in square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,21 +78,50 @@ def mismatch(values: FloatArray) -> FloatArray:
 
 
 def detect_period(time: FloatArray, values: FloatArray) -> float | None:
-    """The period of signals, if they repeat themselves unambiguously.
+    """The period of signals, if they repeat themselves beyond doubt.
+
+    A smooth motion is always a little like itself some time later. It counts as periodic where repeats differ by no
+    more than their noise explains, or than a hundredth of the motion, or by no more after several periods than after
+    one. The first of three or more periods is not looked at: it is where motions begin.
 
     Args:
         time: (M,) uniform times [s].
         values: (M, k) signals.
 
     Returns:
-        The smallest lag [s] after which all signals repeat, refined between samples; None where there is none.
+        The smallest lag [s] after which all signals repeat, refined between samples over several periods; None where
+        there is none.
     """
     interval = float((time[-1] - time[0]) / (len(time) - 1))
     thin = max(1, len(time) // 200_000)
     values, interval = values[::thin], interval * thin
     if not np.any(values.std(axis=0) > 0.0):
         return None
-    error = mismatch(values)
+    lag = _first_repeat(mismatch(values))
+    if lag is None:
+        return None
+    if len(values) >= 3 * lag:
+        values = values[lag:]
+    error, moving = mismatch(values), values.std(axis=0) > 0.0
+    repeats = len(values) / lag
+    last = max(int(repeats / 2.0), min(2, int(repeats - 0.5)), 1)
+    period, differences = float(lag), []
+    for k in range(1, last + 1):
+        place, difference = _minimum(error, round(k * period))
+        period = place / k
+        differences.append(difference)
+    noise = float(np.mean(noise_from_curvature(values[:, moving]) / values[:, moving].var(axis=0)))
+    bound = max(ALIKE, NOISE * noise, GROWTH * differences[0] if last > 1 else 0.0)
+    if max(differences) > bound:
+        return None
+    # many logs hold a whole number of samples per period; what is that within the accuracy of the lag is that
+    if abs(period - round(period)) < 0.3 / last:
+        period = float(round(period))
+    return period * interval
+
+
+def _first_repeat(error: FloatArray) -> int | None:
+    """The smallest lag in samples that is as good a period as any, by the mismatch after every lag."""
     # leave the neighbourhood of lag zero: a period starts where the signal has first become unlike itself
     unlike = np.flatnonzero(error > 0.2)
     if not unlike.size:
@@ -91,18 +131,24 @@ def detect_period(time: FloatArray, values: FloatArray) -> float | None:
     minima = minima[error[minima] < REPEATS_WITHIN]
     if not minima.size:
         return None
-    best = float(error[minima].min())
-    good = minima[error[minima] <= max(4.0 * best, 1e-9)]
-    lag = int(good[0])
-    left, middle, right = error[lag - 1], error[lag], error[lag + 1]
+    # a minimum between two samples is lower than both, and known to a small share of what it rises to the next
+    found = [_minimum(error, int(lag)) for lag in minima]
+    height = np.array([low for _, low in found])
+    rise = error[minima - 1] + error[minima + 1] - 2.0 * error[minima]
+    return int(minima[height <= max(4.0 * float(height.min()), 1e-9) + 0.02 * rise][0])
+
+
+def _minimum(error: FloatArray, near: int) -> tuple[float, float]:
+    """Place, between samples, and height of the minimum of the mismatch next to a lag."""
+    near = min(near, len(error) - 2)
+    while 1 < near < len(error) - 2 and min(error[near - 1], error[near + 1]) < error[near]:
+        near += 1 if error[near + 1] < error[near - 1] else -1
+    left, middle, right = error[near - 1], error[near], error[near + 1]
     curvature = left - 2.0 * middle + right
-    shift = 0.5 * (left - right) / curvature if curvature > 0.0 else 0.0
-    periods = len(values) / lag
-    # many logs hold a whole number of samples per period; what is that within the accuracy of the lag is that
-    refined = lag + float(np.clip(shift, -0.5, 0.5))
-    if abs(refined - lag) < 0.3 / max(periods, 1.0) + 0.1:
-        refined = float(lag)
-    return refined * interval
+    if curvature <= 0.0:
+        return float(near), float(middle)
+    shift = float(np.clip(0.5 * (left - right) / curvature, -0.5, 0.5))
+    return near + shift, max(float(middle - 0.5 * curvature * shift**2), 0.0)
 
 
 def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> Cut:

@@ -1,6 +1,7 @@
 """`process`: from a recording to mean motion, derivatives, motor torque and its variance."""
 
 import warnings as python_warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,6 +120,19 @@ def from_states(
             f"{source}: motion of {motion.n} joints and torque of shape {tau_motor.shape} for {robot.name}, which has "
             f"{robot.n} joints"
         )
+    return _one_stretch(source, robot, motion, tau_motor, {})
+
+
+def _one_stretch(
+    source: str,
+    robot: Robot,
+    motion: Motion,
+    tau_motor: FloatArray,
+    channels: dict[str, FloatArray],
+    notes: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+) -> ProcessedRecording:
+    """What was not averaged over periods; its torque noise is that of its fast part."""
     spread = np.broadcast_to(variance.noise_from_curvature(tau_motor), tau_motor.shape)
     return ProcessedRecording(
         source=source,
@@ -131,9 +145,12 @@ def from_states(
         period=None,
         period_motions=(),
         period_tau_motor=tau_motor[None],
-        channels={},
+        channels=channels,
+        places=(0,),
         link_harmonics=0,
         motor_harmonics=0,
+        notes=tuple(notes),
+        warnings=tuple(warnings),
     )
 
 
@@ -261,6 +278,7 @@ def _periodic(
         period_motions=parts if count > 1 else (),
         period_tau_motor=tau,
         channels={name: cuts[name].mean(axis=0) for name in signals.others},
+        places=tuple(keep),
         link_harmonics=int(links),
         motor_harmonics=int(motors),
         notes=tuple(notes),
@@ -358,21 +376,5 @@ def _not_periodic(
     motion = Motion(time[inside], *(p[0] for p in parts), *(p[1] for p in parts))
     load = values["torque"][inside]
     tau = load * torque.transmitted(load, signals.torque.efficiency, motion.dtheta)
-    spread = np.broadcast_to(variance.noise_from_curvature(tau), tau.shape)
-    return ProcessedRecording(
-        source=source,
-        joint_names=robot.joint_names,
-        motion=motion,
-        tau_motor=tau,
-        tau_variance=spread,
-        raw_tau_variance=spread,
-        periods=1,
-        period=None,
-        period_motions=(),
-        period_tau_motor=tau[None],
-        channels={name: values[name][inside] for name in signals.others},
-        link_harmonics=0,
-        motor_harmonics=0,
-        notes=tuple(notes),
-        warnings=tuple(found),
-    )
+    channels = {name: values[name][inside] for name in signals.others}
+    return _one_stretch(source, robot, motion, tau, channels, notes, found)

@@ -25,6 +25,7 @@ class ProcessedRecording:
         period_tau_motor: (P, N, n) motor torque of every period [N m] or [N].
         channels: further signals (N, n) by kind, averaged alike: current, tau_spring, temperature, ...; `deflection` is
             theta - q as it was measured, without the Fourier fit.
+        places: (P,) number of every period in the recording, from 0: some may have been left out between others.
         link_harmonics: harmonics kept in q, 0 where the recording is not periodic.
         motor_harmonics: harmonics kept in theta, 0 where the recording is not periodic.
         notes: what was done.
@@ -42,6 +43,7 @@ class ProcessedRecording:
     period_motions: tuple[Motion, ...]
     period_tau_motor: FloatArray
     channels: Mapping[str, FloatArray]
+    places: tuple[int, ...]
     link_harmonics: int
     motor_harmonics: int
     notes: tuple[str, ...] = ()
