@@ -1,0 +1,52 @@
+"""Whitened columns in parts add up to those that are whitened as a whole."""
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import period_data, spectrum, wide_processing
+from sea_ident.discrepancy.diagnose import model_effects
+from sea_ident.discrepancy.settle import settle
+from sea_ident.simulation import simulate
+
+PERIOD = 5.0
+
+
+@pytest.fixture(scope="module")
+def settled():
+    leg = sea_ident.load_robot("exo_leg")
+    series = sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=0).series
+    recording = simulate(leg, series, periods=6, seed=3).recording
+    model = sea_ident.identify(leg, recording, period=PERIOD)
+    bench = Bench(period_data(wide_processing(recording, leg, PERIOD), leg), model_effects(model))
+    return bench, settle(bench, bench.effects)
+
+
+def test_parts_in_any_scale_add_up(settled):
+    bench, now = settled
+    whitening = bench.whitening(now.noise)
+    rng = np.random.default_rng(5)
+    shape = (bench.data.harmonics + 1, len(bench.data.equations), 3)
+    values = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    # only equations with a spring have a scale of their own
+    scale = np.where(whitening.parts > 0, rng.uniform(0.2, 5.0, shape[1]), 1.0)
+    assert np.count_nonzero(scale != 1.0) == 3
+    parts = whitening.scaled(whitening.in_parts(values), scale)
+    np.testing.assert_allclose(parts, whitening.flat(values * scale[:, None]), atol=1e-9 * np.abs(parts).max())
+
+
+def test_a_fit_says_the_same_of_its_residual_as_a_plain_projection(settled):
+    bench, now = settled
+    fit = now.fit
+    target = spectrum(bench.data.target(bench.data.tau_motor), bench.data.harmonics)
+    residual = target - bench.design(fit.effects) @ fit.values
+    np.testing.assert_allclose(residual, fit.residual, atol=1e-9 * np.abs(target).max())
+    whitened = bench.whitening(now.noise).flat(residual * fit.scale)
+    np.testing.assert_allclose(whitened, fit.whitened, atol=1e-6 * np.abs(fit.whitened).max())
+    assert bench.statistic(fit, now.noise) == pytest.approx(fit.statistic, rel=1e-9)
+
+
+def test_a_noise_floor_is_applied_once(settled):
+    bench, now = settled
+    assert bench.whitening(now.noise) is bench.whitening(now.noise)
