@@ -15,7 +15,7 @@ from sea_ident.recordings.naming import TIME, dimension_of
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import RawTable
 
-_TIME_ELSEWHERE = ("t", "time", "time_s", "timestamp", "stamp", "secs", "seconds")
+_TIME_ELSEWHERE = re.compile(r"(t|time|timestamp|stamp|secs|seconds)\b|time_|t_")
 
 
 def assemble(
@@ -138,20 +138,17 @@ def _streams(sources: Mapping[str, ColumnSource], table: RawTable, source: str, 
 def _absent(name: str, target: str, table: RawTable, source: str) -> str:
     near = get_close_matches(name, table.columns, n=1, cutoff=0.6)
     hint = f" Did you mean {near[0]!r}?" if near else ""
-    return (
-        f"{source}: no column {name!r} (wanted for {target}).{hint} "
-        f"There are: {', '.join(table.columns) or 'none'}{_and_others(table)}"
-    )
+    return f"{source}: no column {name!r} (wanted for {target}).{hint} There are: {_all(table)}"
 
 
 def _no_time(table: RawTable, source: str) -> str:
-    near = [name for name in table.columns if name.strip().lower() in _TIME_ELSEWHERE]
+    near = [name for name in (*table.columns, *table.left_out) if _TIME_ELSEWHERE.match(name.strip().lower())]
     example = near[0] if near else "<name in the file>"
     return (
-        f"{source}: no column 'time'; there are: {', '.join(table.columns) or 'none'}{_and_others(table)}. "
-        f"If it has another name, say columns={{'time': {example!r}}}"
+        f"{source}: no column 'time'. If it has another name, say columns={{'time': {example!r}}}, on the command line "
+        f"--column 'time={example}' (its unit too, if it is not s: ,unit=ms). There are: {_all(table)}"
     )
 
 
-def _and_others(table: RawTable) -> str:
-    return f". Left out: {', '.join(table.left_out)}" if table.left_out else ""
+def _all(table: RawTable) -> str:
+    return ", ".join((*table.columns, *table.left_out)) or "none"

@@ -43,7 +43,9 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
     header, start, first_line = _header(text, path)
     wanted = [i for i, name in enumerate(header) if is_wanted(name, names)]
     if not wanted:
-        raise RecordingError(f"{path}: none of the columns asked for; there are: {', '.join(header)}")
+        raise RecordingError(
+            f"{path}: none of the columns asked for ({', '.join(sorted(names or ()))}). There are: {', '.join(header)}"
+        )
     body = text[start:].rstrip()
     if not body:
         raise RecordingError(f"{path}: a header, but no rows of numbers")

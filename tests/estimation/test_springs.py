@@ -140,3 +140,14 @@ def test_circular_motor_torque(leg, truth):
 def test_no_torque_channel(leg, truth):
     with pytest.raises(RecordingError, match="no column tau_spring"):
         identify_measured_springs(leg, record(leg, truth, 1))
+
+
+def test_a_negative_stiffness_is_warned_of(leg, truth):
+    recording = record(leg, truth, 8, **NOISE)
+    moved = recording.replace_columns({"theta_hip": recording.columns["theta_hip"] + 0.5})
+    model = identify(leg, moved, period=10.0)
+    assert model.springs[0].stiffness < 0.0
+    told = [text for text in model.warnings if "negative" in text]
+    assert len(told) == 1
+    assert "hip" in told[0]
+    assert "--unknown-zero" in told[0]
