@@ -22,16 +22,18 @@ class Regressor:
         columns: (p,) labels.
         link: (N, n, p) link rows: ``link @ psi = 0``, with the springs among the columns.
         motor: (N, n, p) motor rows: ``motor @ psi = tau_motor``.
+        recorded_sum: (N, n, p) sum of both at the times of the recorded torques; None where these are on time.
     """
 
     columns: tuple[Column, ...]
     link: FloatArray
     motor: FloatArray
+    recorded_sum: FloatArray | None = None
 
     @property
     def sum(self) -> FloatArray:
         """(N, n, p) sum of both: ``sum @ psi = tau_motor`` without a spring model (paper, eq. 4)."""
-        return self.link + self.motor
+        return self.link + self.motor if self.recorded_sum is None else self.recorded_sum
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -91,10 +93,13 @@ def build_regressor(
     for place, part in _parts(effects, state):
         _put(link, place, part.link, part.joint, slice(None))
         _put(motor, place, part.motor, part.joint, slice(None))
-    rows = Contribution(link, motor)
-    for effect in effects:
-        rows = effect.shifted(robot, motion.time, rows)
-    return Regressor(columns, rows.link, rows.motor)
+    late = [effect for effect in effects if type(effect).shifted is not Effect.shifted]
+    if not late:
+        return Regressor(columns, link, motor)
+    rows, whole = Contribution(link, motor), _as_motor_rows(link + motor)
+    for effect in late:
+        rows, whole = (effect.shifted(robot, motion.time, each) for each in (rows, whole))
+    return Regressor(columns, rows.link, rows.motor, whole.link + whole.motor)
 
 
 def build_total(
@@ -131,10 +136,18 @@ def build_total(
         take: IntArray | slice = slice(None) if len(inside) == place.stop - place.start else inside
         _put(total, slice(first, last), part.link, part.joint, take)
         _put(total, slice(first, last), part.motor, part.joint, take, _is_nothing(part.link))
-    whole = Contribution(total, np.broadcast_to(0.0, total.shape))
-    for effect in effects:
+    late = [effect for effect in effects if type(effect).shifted is not Effect.shifted]
+    if not late:
+        return total
+    whole = _as_motor_rows(total)
+    for effect in late:
         whole = effect.shifted(robot, motion.time, whole)
-    return whole.link if _is_nothing(whole.motor) else whole.link + whole.motor
+    return whole.link + whole.motor
+
+
+def _as_motor_rows(total: FloatArray) -> Contribution:
+    """The sum of both rows as rows of the motor, whose torque it gives: it is late as a whole."""
+    return Contribution(np.zeros_like(total), total)
 
 
 def _parts(effects: Sequence[Effect], state: State) -> Iterator[tuple[slice, Contribution]]:

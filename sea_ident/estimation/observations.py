@@ -160,7 +160,10 @@ class Observations:
         spring = np.zeros((len(motion), len(elastic), base.rank))
         for part, regressor in _chunks(robot, self.effects, motion, self.processed.channels):
             link, motor = regressor.link[:, :, base.independent], regressor.motor[:, :, base.independent]
-            np.add(link, motor, out=total[part])
+            if regressor.recorded_sum is None:
+                np.add(link, motor, out=total[part])
+            else:
+                total[part] = regressor.recorded_sum[:, :, base.independent]
             if side is SpringSide.LINK:
                 spring[part] = link[:, elastic]
             elif side is SpringSide.MOTOR:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects import JointEffect
+from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.period_scores import period_scores
@@ -85,22 +85,27 @@ def springs_from(
             "joints, so the spring torque is not known; give priors or record more kinds of motion"
         )
     tau = observations.spring_torque(observations.mean, processed.tau_motor, values)
+    # a spring lies between the motor and the bodies, wherever an encoder that errs sees these
+    motion = corrected_motion(robot, observations.effects, processed.motion)
     per_period = None
     if processed.periods > 1 and len(uncertainty.influences) == processed.periods:
         per_period = [
-            (motion, observations.spring_torque(rows, torque, values))
-            for motion, rows, torque in zip(
+            (
+                corrected_motion(robot, observations.effects, own_motion),
+                observations.spring_torque(rows, torque, values),
+            )
+            for own_motion, rows, torque in zip(
                 processed.period_motions, observations.each_period(), processed.period_tau_motor, strict=True
             )
         ]
     results = []
     for k, joint in enumerate(elastic):
         name = robot.joint_names[joint]
-        own = None if per_period is None else [(motion, torque[:, k]) for motion, torque in per_period]
+        own = None if per_period is None else [(each, torque[:, k]) for each, torque in per_period]
         data = _SpringData(
             name,
             int(joint),
-            processed.motion,
+            motion,
             tau[:, k],
             observations.mean.spring[:, k],
             own,
