@@ -1,16 +1,29 @@
 """The model with what was found."""
 
 import warnings as python_warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.effects import Side, spring_effects
+from sea_ident.effects import Effect, Side, spring_effects
 from sea_ident.estimation import Model, identify
+from sea_ident.estimation.identify import with_values
+from sea_ident.estimation.knowledge import regular_covariance
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
+
+OPEN = 0.5
+"""Standard deviation, in logarithms or in shares of its range, from which on a recording leaves a shape open [-]."""
 
 
 def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Model | None:
     """The model identified anew with the effects that were found; None where that is not possible.
+
+    `identify` weighs the sum of both equations of a joint sample by sample. What a link equation tells, without any
+    noise of torque, is in the fit of the diagnosis: both are put together, weighted by their covariances. A shape that
+    the recording leaves open stays as the model had it.
 
     Args:
         model: the model that was diagnosed.
@@ -21,10 +34,58 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
         A model like any other.
     """
     law = set(spring_effects(model.robot))
-    effects = tuple(effect for effect in fit.effects if effect.side is not Side.SPRING or effect not in law)
+    known = (*model.effects, *model.spring_effects)
+    effects = tuple(
+        effect for effect in with_open_shapes(fit, known) if effect.side is not Side.SPRING or effect not in law
+    )
     try:
         with python_warnings.catch_warnings():
             python_warnings.simplefilter("ignore", SeaIdentWarning)
-            return identify(model.robot, processed, effects=effects)
+            return with_link_equations(identify(model.robot, processed, effects=effects), processed, fit)
     except SeaIdentError:
         return None
+
+
+def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects of a fit, with the shapes that it leaves open as in the effects that are known."""
+    effects = list(fit.effects)
+    usual = {(type(effect), effect.joint): effect for effect in known}
+    for k, (position, shape) in enumerate(fit.free_shapes):
+        effect = effects[position]
+        before = usual.get((type(effect), effect.joint))
+        if before is not None and fit.std(len(fit.columns) + k) > OPEN:
+            effects[position] = replace(effect, **{shape.name: getattr(before, shape.name)})
+    return tuple(effects)
+
+
+def with_link_equations(model: Model, processed: ProcessedRecording, fit: Fit) -> Model:
+    """A model with what the fit of a diagnosis tells of its bodies and of friction at its links.
+
+    Args:
+        model: identified from the motor torques.
+        processed: the recording.
+        fit: to link and motor equations of the same recording, with the same parameters.
+
+    Returns:
+        The model; as it is where it has no springs, and so no link equations.
+    """
+    base, columns = model.base, [column.name for column in fit.columns]
+    names = [column.name for column in base.columns]
+    if not model.robot.elastic_indices.size or not set(names) <= set(columns):
+        return model
+    rows = [columns.index(name) for name in names]
+    factor = base.grouping @ fit.covariance_factor[rows]
+    told = [k for k, i in enumerate(base.independent) if base.columns[i].side is not Side.MOTOR]
+    own, other = regular_covariance(model), factor[told] @ factor[told].T
+    gain = own[:, told] @ np.linalg.inv(own[np.ix_(told, told)] + other)
+    values = model.values + gain @ ((base.grouping @ fit.values[rows])[told] - model.values[told])
+    left = np.eye(len(values))
+    left[:, told] -= gain
+    covariance = left @ own @ left.T + gain @ other @ gain.T
+    uncertainty = replace(
+        model.uncertainty,
+        covariance=covariance,
+        repeatability=covariance,
+        influences=model.uncertainty.influences @ left.T,
+    )
+    return with_values(replace(model, uncertainty=uncertainty), processed, values)

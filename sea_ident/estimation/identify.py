@@ -132,8 +132,8 @@ def _doubts(model: Model) -> list[str]:
     found.extend(f"spring of {s.joint}: {s.note}" for s in model.springs if s.verdict in UNSAFE)
     found.extend(
         f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g}, "
-        f"deflection up to {s.largest_deflection:.3g}): have the encoders of link and motor different zeros (unknown_zero, on the "
-        "command line --unknown-zero), or has one of them the wrong sign?"
+        f"deflection up to {s.largest_deflection:.3g}): have the encoders of link and motor different zeros (unknown_zero, "
+        "on the command line --unknown-zero), or has one of them the wrong sign?"
         for s in model.springs
         if s.stiffness < -5.0 * s.stiffness_std
     )
@@ -343,6 +343,21 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
     return replace(model, excerpt=excerpt)
 
 
+def with_values(model: Model, processed: ProcessedRecording, values: FloatArray) -> Model:
+    """A model with other values (b,) of its base parameters, its residuals and its springs by these.
+
+    Args:
+        model: identified from the recording.
+        processed: the recording.
+        values: (b,) base parameters.
+    """
+    observations = Observations(model.robot, model.effects, model.base, processed)
+    changed = _refitted(replace(model, values=values), observations)
+    inside = tuple(effect for effect in model.spring_effects if isinstance(effect, JointEffect))
+    zeros = [spring.joint for spring in model.springs if spring.zero != 0.0]
+    return replace(changed, springs=springs_from(observations, values, model.uncertainty, zeros, inside))
+
+
 def _refitted(model: Model, observations: Observations) -> Model:
     """The residuals of a model whose values were changed after the fit."""
     residual, scatter = observations.residual(model.values), observations.period_residuals(model.values)
@@ -357,6 +372,7 @@ def _refitted(model: Model, observations: Observations) -> Model:
         excerpt=replace(
             model.excerpt,
             tau_model=observations.torque[thin] - residual[thin],
+            tau_spring=observations.spring_torque(observations.mean, observations.torque, model.values)[thin],
             residual_std=_spread(scatter, observations.processed)[thin],
         ),
     )
