@@ -37,3 +37,9 @@ def moved(effect: Effect, shape: Shape, step: float) -> Effect:
     value = float(getattr(effect, shape.name))
     new = value * np.exp(step) if shape.logarithmic else value + step * (shape.upper - shape.lower)
     return replace(effect, **{shape.name: float(np.clip(new, shape.lower, shape.upper))})  # type: ignore[arg-type]
+
+
+def distance(low: Effect, high: Effect, shape: Shape) -> float:
+    """How far a shape moved from one effect to another, in the coordinates of `moved`: less at the end of its range."""
+    first, last = float(getattr(low, shape.name)), float(getattr(high, shape.name))
+    return float(np.log(last / first)) if shape.logarithmic else (last - first) / (shape.upper - shape.lower)

@@ -10,7 +10,7 @@ import pinocchio as pin
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Columns
 from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
-from sea_ident.discrepancy.free_shapes import moved, signal_effects
+from sea_ident.discrepancy.free_shapes import distance, moved, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Contribution, Effect, JointEffect, Shape, Side, State, corrected_motion
 from sea_ident.effects.load import LoadEffect
@@ -87,10 +87,10 @@ class Tangents(Columns):
                 continue
             own = values[starts[position] : starts[position + 1]]
             low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
-            state = self.state(effects)
+            state, apart = self.state(effects), distance(low, high, shape)
             parts = [e.evaluate(state) for e in (low, high)]
             change = Contribution(
-                (parts[1].link - parts[0].link) @ own / 2e-3, (parts[1].motor - parts[0].motor) @ own / 2e-3
+                (parts[1].link - parts[0].link) @ own / apart, (parts[1].motor - parts[0].motor) @ own / apart
             )
             out[:, :, k] = self._spectra(change, signal_effects(effects))
             if effect.side is Side.SPRING:
@@ -114,13 +114,15 @@ class Tangents(Columns):
         signals = signal_effects(effects)
         step = 1e-4 * (amount.upper - amount.lower)
         here = float(getattr(effect, amount.name))
-        others = tuple(s for s in signals if s != effect)
+        # corrections do not commute: every one stays in its place
+        chain = signals if effect in signals else (*signals, effect)
         motions, rows, springs = [], [], []
         # what stands at another joint does not see this signal
         rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
         for sign in (-1.0, 1.0):
-            changed = (*others, replace(effect, **{amount.name: here + sign * step}))  # type: ignore[arg-type]
-            motion = corrected_motion(self.robot, changed, self.data.motion)
+            changed = replace(effect, **{amount.name: here + sign * step})  # type: ignore[arg-type]
+            whole = tuple(changed if signal == effect else signal for signal in chain)
+            motion = corrected_motion(self.robot, whole, self.data.motion)
             motions.append(motion)
             state = State(self.robot, motion, self.data.channels)
             total, spring = (np.zeros((2, len(motion), self.robot.n)) for _ in range(2))

@@ -1,0 +1,76 @@
+"""A leg, a short motion of it and what its sensors see: shared by the tests of the parts of a diagnosis."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.robot import Robot
+from sea_ident.simulation import PlantedEffect, simulate
+
+PERIOD = 5.0
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """Records short experiments with the leg and puts them on the bench."""
+
+    leg: Robot
+    motions: tuple[object, ...]
+
+    @property
+    def effects(self):
+        """The usual model."""
+        return (*base_effects(self.leg), *spring_effects(self.leg))
+
+    def record(self, planted=(), *, periods=8, seed=3, motion=0, **options):
+        """A recording with some effects in the leg, each `(name, joint, values, shape)` or an effect with values."""
+        found = []
+        for item in planted:
+            effect = item[0] if not isinstance(item[0], str) else make_effect(item[0], item[1], **item[3])
+            values = item[1] if not isinstance(item[0], str) else item[2]
+            found.append(PlantedEffect(effect, np.asarray(values, dtype=float)))
+        return simulate(
+            self.leg, self.motions[motion], periods=periods, seed=seed, effects=found, **options
+        ).recording
+
+    def data(self, recording):
+        """Its periods."""
+        return period_data(wide_processing(recording, self.leg, PERIOD), self.leg)
+
+    def bench(self, recording, effects=None):
+        """The recording on the bench, with the usual model unless another is given."""
+        return Bench(self.data(recording), self.effects if effects is None else effects)
+
+
+@pytest.fixture(scope="session")
+def laboratory():
+    leg = sea_ident.load_robot("exo_leg")
+    motions = tuple(
+        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
+        for seed in (0, 1)
+    )
+    return Laboratory(leg, motions)
+
+
+@pytest.fixture(scope="session")
+def nothing_missing(laboratory):
+    """Bench and settled model of a leg that has what the model has."""
+    bench = laboratory.bench(laboratory.record())
+    return bench, settle(bench, bench.effects)
+
+
+@pytest.fixture(scope="session")
+def rippled(laboratory):
+    """Bench, settled model without and with it: a leg whose hip motor cogs by 1 N m four times per radian."""
+    bench = laboratory.bench(laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})]))
+    start = settle(bench, bench.effects)
+    ripple = make_effect("torque_ripple", "hip", order=4.0)
+    with_it = bench.fit((*start.fit.effects, ripple), start.noise, start=start.fit.parameters)
+    again = Settled(with_it, bench.noise(with_it))
+    return bench, start, Settled(bench.fit(with_it.effects, again.noise, start=with_it.parameters), again.noise)

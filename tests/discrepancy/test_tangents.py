@@ -1,0 +1,155 @@
+"""Derivatives with respect to shapes and sensor errors agree with differences of the residual."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.free_shapes import free_shapes, moved
+from sea_ident.effects import effect_classes, make_effect
+from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.signal import SignalEffect
+
+STEP = 5e-4
+"""Of the differences, in the coordinates of `moved`; not the one that the analytic side uses."""
+
+WITH_SHAPES = sorted(
+    name
+    for name, kind in effect_classes().items()
+    if not issubclass(kind, TrendEffect)
+    and (issubclass(kind, SignalEffect) or kind.shapes)
+    and free_shapes((kind(joint="knee"),))
+)
+
+TOGETHER = {
+    "an offset after an eccentricity": (
+        make_effect("encoder_eccentricity", "knee", sine=0.01, cosine=0.02),
+        make_effect("encoder_offset", "knee", offset=0.03),
+    ),
+    "a late encoder before a flexible link": (
+        make_effect("position_delay", "knee", delay=0.003),
+        make_effect("link_flexibility", "knee", compliance=1e-4),
+    ),
+    "an offset, and signals that come late": (
+        make_effect("encoder_offset", "knee", offset=0.03),
+        make_effect("torque_delay", "hip", delay=0.003),
+        make_effect("position_delay", "knee", delay=0.002),
+    ),
+    "a torque that comes late, of which one is a ripple": (
+        make_effect("torque_ripple", "knee", order=4.0),
+        make_effect("torque_delay", "knee", delay=0.003),
+    ),
+}
+
+
+def scale_of(bench, fit):
+    """(E,) factor of the residual: the stiffness of the first fit over that of this one, one beside links."""
+    first = bench.first_stiffness
+    return np.where(first > 0.0, first / np.where(first > 0.0, bench.stiffness_of(fit), 1.0), 1.0)
+
+
+def scaled_residual(bench, effects, parameters):
+    fit = bench.predicted(effects, parameters)
+    return scale_of(bench, fit)[:, None].T * fit.residual
+
+
+def far_off(bench, added):
+    """A model that is wrong enough for its residual to count: the knee stiffer by a third, all else by some percent."""
+    base = bench.first_fit
+    effects = [e for e in base.effects if (e.name, e.joint) not in {(a.name, a.joint) for a in added}]
+    rng = np.random.default_rng(0)
+    parameters = {k: v * (1.0 + 0.05 * rng.standard_normal()) for k, v in base.parameters.items()}
+    parameters["knee.spring_stiffness"] *= 1.3
+    for effect in added:
+        for column in effect.columns(bench.robot):
+            parameters.setdefault(column.name, 0.5)
+    effects = list(bench.anchored((*effects, *added), parameters))
+    return effects, parameters, len(effects) - len(added)
+
+
+def compare(bench, added, tolerance=2e-4):
+    effects, parameters, first = far_off(bench, added)
+    fit = bench.predicted(effects, parameters)
+    shapes = [(k, shape) for k, shape in free_shapes(effects) if k >= first]
+    assert shapes
+    parts = bench.tangents(tuple(effects), fit.columns, fit.values, shapes)
+    tangents = bench.scaled(*parts, fit.residual, scale_of(bench, fit), bench.stiffness_of(fit))
+    for k, (position, shape) in enumerate(shapes):
+        ends = []
+        for step in (STEP, -STEP):
+            changed = list(effects)
+            changed[position] = moved(effects[position], shape, step)
+            ends.append(scaled_residual(bench, changed, parameters))
+        decrease = (ends[1] - ends[0]) / (2.0 * STEP)
+        error = np.linalg.norm(decrease - tangents[:, :, k]) / np.linalg.norm(decrease)
+        assert np.linalg.norm(decrease) > 0.0
+        assert error < tolerance, (effects[position].name, shape.name, error)
+
+
+@pytest.mark.parametrize("name", WITH_SHAPES)
+def test_every_shape_of_every_effect(nothing_missing, name):
+    kind = effect_classes()[name]
+    effect = next(e for e in kind.instances(nothing_missing[0].robot) if e.joint == "knee")
+    if isinstance(effect, SignalEffect):
+        effect = replace(effect, **{amount.name: 0.03 * amount.upper for amount in effect.amounts})
+    for shape in effect.shapes:
+        if not shape.logarithmic:  # away from the ends of its range
+            effect = replace(effect, **{shape.name: 0.7 * shape.upper + 0.3 * shape.lower})
+    # where an element of a hysteresis slips or sticks its torque has a kink: two steps of different size see two slopes
+    compare(nothing_missing[0], [effect], 0.02 if name == "spring_hysteresis" else 2e-4)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 2.0])
+def test_at_the_end_of_its_range_a_shape_has_the_slope_from_within(nothing_missing, exponent):
+    bench, _ = nothing_missing
+    effects, parameters, first = far_off(bench, [make_effect("stribeck_friction", "knee", exponent=exponent)])
+    fit = bench.predicted(effects, parameters)
+    pair = next((k, shape) for k, shape in free_shapes(effects) if k >= first and shape.name == "exponent")
+    parts = bench.tangents(tuple(effects), fit.columns, fit.values, [pair])
+    tangent = bench.scaled(*parts, fit.residual, scale_of(bench, fit), bench.stiffness_of(fit))[:, :, 0]
+    step = STEP if exponent < 1.0 else -STEP
+    changed = [*effects[:-1], moved(effects[-1], pair[1], step)]
+    decrease = (scaled_residual(bench, effects, parameters) - scaled_residual(bench, changed, parameters)) / step
+    assert np.linalg.norm(decrease - tangent) < 0.01 * np.linalg.norm(decrease)
+
+
+@pytest.mark.parametrize("case", TOGETHER)
+def test_corrections_that_follow_each_other(nothing_missing, case):
+    compare(nothing_missing[0], TOGETHER[case])
+
+
+def test_a_candidate_at_zero_is_seen_as_one_of_the_model(nothing_missing):
+    """The search asks before the effect is in the model, with the same answer."""
+    bench, _ = nothing_missing
+    known = make_effect("encoder_eccentricity", "knee", sine=0.01, cosine=0.02)
+    effects, parameters, _ = far_off(bench, [known])
+    offset = make_effect("encoder_offset", "knee")
+    before = bench.signal_tangent(offset, offset.amounts[0], effects, parameters)
+    after = bench.signal_tangent(offset, offset.amounts[0], [*effects, offset], parameters)
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9 * np.abs(other).max())
+
+
+def test_every_parameter(nothing_missing):
+    """`Fit.directions` is the decrease of the scaled residual with every parameter, a stiffness included."""
+    bench, now = nothing_missing
+    fit = now.fit
+    for k, column in enumerate(fit.columns):
+        power = np.linalg.norm(fit.directions[:, :, k])
+        if power == 0.0:
+            continue
+        step = 1e-4 * np.linalg.norm(bench.data.tau_motor) / power / len(bench.data.tau_motor)
+        ends = [
+            scaled_residual(bench, fit.effects, {**fit.parameters, column.name: fit.parameters[column.name] + s * step})
+            for s in (1.0, -1.0)
+        ]
+        decrease = (ends[1] - ends[0]) / (2.0 * step)
+        assert np.linalg.norm(decrease - fit.directions[:, :, k]) < 1e-3 * power, column.name
+
+
+def test_moved_counts_factors_and_ranges():
+    stribeck = make_effect("stribeck_friction", "knee", speed=0.1, exponent=1.0)
+    speed, exponent = stribeck.shapes
+    assert moved(stribeck, speed, 0.5).speed == pytest.approx(0.1 * np.exp(0.5))
+    assert moved(stribeck, exponent, 0.2).exponent == pytest.approx(1.0 + 0.2 * (exponent.upper - exponent.lower))
+    assert moved(stribeck, speed, 50.0).speed == speed.upper
