@@ -253,13 +253,21 @@ def _check_signs(observations: Observations) -> list[str]:
         raise IdentificationError(
             f"{source}: the inertia comes out negative in every joint "
             f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
-            "current has the wrong sign; exchange it (ColumnSource sign=-1)"
+            f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on)"
         )
     return [
         f"{source}: the inertia that joint {name!r} moves comes out negative from its own torque: has that torque or "
-        "current the wrong sign?"
+        f"current the wrong sign? Then exchange it ({_exchanged(name)}); the other joints are wrong with it"
         for name in names
     ]
+
+
+def _exchanged(joint: str) -> str:
+    column = f"tau_motor_{joint}"
+    return (
+        f"ColumnSource({column!r}, sign=-1), on the command line --column {column}={column},sign=-1; likewise "
+        f"current_{joint} where there is no torque"
+    )
 
 
 def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:

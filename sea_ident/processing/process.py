@@ -299,7 +299,7 @@ def _kept_periods(source: str, cuts: dict[str, FloatArray], found: list[str], no
         found.append(
             f"{source}: periods {', '.join(f'{a + 1} and {b + 1}' for a, b in copies[:3])} "
             f"{'and others ' if len(copies) > 3 else ''}are the same numbers: measurements never are. "
-            f"{len(copies)} copies were left out"
+            f"{len(copies)} of {count} periods are copies and were left out; look for where the file was put together"
         )
         dropped = {a for a, _ in copies}
         keep = [p for p in keep if p not in dropped]
@@ -363,7 +363,8 @@ def _not_periodic(
     acceleration = filtering.central_difference(rate, interval)
     found.append(
         f"{source}: no period: positions filtered forwards and backwards at {frequency:.3g} Hz and differentiated; "
-        "without periods there is no scatter to judge the torque noise by"
+        "without periods there is no scatter to judge the torque noise by. If the motion repeats, give its period "
+        "(--period on the command line); else record one that does, ten times or more"
     )
     edge = min(int(np.ceil(1.0 / (frequency * interval))), recording.samples // 8)
     inside = slice(edge, recording.samples - edge)

@@ -97,7 +97,10 @@ def transmitted(torque: FloatArray, efficiency: FloatArray, direction: FloatArra
 def _saturation(values: FloatArray, column: str, source: str) -> str:
     for extreme, side in ((values.max(), "highest"), (values.min(), "lowest")):
         if values.max() == values.min():
-            return f"{source}: column {column} is constant, {values[0]:g}: it is no measured torque"
+            return (
+                f"{source}: column {column} is constant, {values[0]:g}: it is no measured torque, and spoils what is "
+                "identified of all joints. Record it, or leave the joint out (joints, on the command line --joints)"
+            )
         at = np.isclose(values, extreme, rtol=1e-9, atol=0.0)
         # a sampled signal has a flat top only where something cuts it
         flat = at[1:] & at[:-1]

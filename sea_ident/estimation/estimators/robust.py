@@ -55,7 +55,7 @@ class Robust(Estimator):
             notes = (f"{100.0 * share:.2g} % of the torque samples lay beyond {self.reach:g} standard deviations",)
         else:
             variance = processed.raw_tau_variance.copy()
-        noise, warnings = floored(variance / periods)
+        noise, warnings = floored(variance / periods, processed.joint_names)
         weights = valid / noise
         for _ in range(ROUNDS):
             before = weights

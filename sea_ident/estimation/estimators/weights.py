@@ -1,5 +1,6 @@
 """Weights per sample: scatter between periods, and what the model lacks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +75,7 @@ def sample_weights(observations: Observations, smoothing: float, share: FloatArr
     variance = processed.raw_tau_variance
     if processed.periods > 1:
         variance = smooth_over_phase(variance, processed.interval, smoothing)
-    variance, warnings = floored(variance / processed.periods)
+    variance, warnings = floored(variance / processed.periods, processed.joint_names)
     rows, torque = observations.rows, observations.torque
     valid = observations.valid * (1.0 if share is None else share)
     count = np.maximum(valid.sum(axis=0) - rows.shape[-1] / rows.shape[1], 1.0)
@@ -137,11 +138,12 @@ def steady(observations: Observations) -> FloatArray:
     return share
 
 
-def floored(variance: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+def floored(variance: FloatArray, names: Sequence[str]) -> tuple[FloatArray, tuple[str, ...]]:
     """Variances that can be divided by: none below a small share of the joint's mean.
 
     Args:
         variance: (N, n).
+        names: (n,) joints.
 
     Returns:
         (N, n) positive variances, and warnings. A joint without any scatter gets the smallest scatter of the others;
@@ -153,13 +155,19 @@ def floored(variance: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     if np.all(dead):
         return np.ones_like(variance), ("the torque does not scatter between periods: all samples weigh the same",)
     if np.any(dead):
-        warnings.append("the torque of some joints does not scatter between periods: they weigh as the quietest other")
+        which = ", ".join(name for name, no in zip(names, dead, strict=True) if no)
+        warnings.append(
+            f"the torque of {which} does not scatter between periods: it weighs as that of the quietest other joint. Is "
+            "it measured?"
+        )
         mean = np.where(dead, mean[~dead].min(), mean)
         variance = np.where(dead, mean, variance)
-    zero = np.count_nonzero(variance <= 0.0)
-    if zero:
+    zero = np.count_nonzero(variance <= 0.0, axis=0)
+    if np.any(zero):
+        which = ", ".join(f"{name} {number}" for name, number in zip(names, zero, strict=True) if number)
         warnings.append(
-            f"{zero} samples have no scatter between periods; they weigh as if it were {VARIANCE_FLOOR**0.5:g} of the "
-            "joint's usual scatter"
+            f"samples of the torque have no scatter between periods ({which} of {len(variance)} in a period): a measured "
+            "torque never repeats exactly; is it held or filled in there? They weigh as if their scatter were "
+            f"{VARIANCE_FLOOR**0.5:g} of the joint's usual one"
         )
     return np.maximum(variance, VARIANCE_FLOOR * mean), tuple(warnings)
