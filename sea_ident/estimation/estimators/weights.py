@@ -157,8 +157,8 @@ def floored(variance: FloatArray, names: Sequence[str]) -> tuple[FloatArray, tup
     if np.any(dead):
         which = ", ".join(name for name, no in zip(names, dead, strict=True) if no)
         warnings.append(
-            f"the torque of {which} does not scatter between periods: it weighs as that of the quietest other joint. Is "
-            "it measured?"
+            f"the torque of {which} does not scatter between periods: it weighs as that of the quietest other joint. "
+            "Is it measured?"
         )
         mean = np.where(dead, mean[~dead].min(), mean)
         variance = np.where(dead, mean, variance)
@@ -166,8 +166,8 @@ def floored(variance: FloatArray, names: Sequence[str]) -> tuple[FloatArray, tup
     if np.any(zero):
         which = ", ".join(f"{name} {number}" for name, number in zip(names, zero, strict=True) if number)
         warnings.append(
-            f"samples of the torque have no scatter between periods ({which} of {len(variance)} in a period): a measured "
-            "torque never repeats exactly; is it held or filled in there? They weigh as if their scatter were "
+            f"samples of the torque have no scatter between periods ({which} of {len(variance)} in a period): a "
+            "measured torque never repeats exactly; is it held or filled in there? They weigh as if their scatter were "
             f"{VARIANCE_FLOOR**0.5:g} of the joint's usual one"
         )
     return np.maximum(variance, VARIANCE_FLOOR * mean), tuple(warnings)
