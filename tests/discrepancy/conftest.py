@@ -35,9 +35,7 @@ class Laboratory:
             effect = item[0] if not isinstance(item[0], str) else make_effect(item[0], item[1], **item[3])
             values = item[1] if not isinstance(item[0], str) else item[2]
             found.append(PlantedEffect(effect, np.asarray(values, dtype=float)))
-        return simulate(
-            self.leg, self.motions[motion], periods=periods, seed=seed, effects=found, **options
-        ).recording
+        return simulate(self.leg, self.motions[motion], periods=periods, seed=seed, effects=found, **options).recording
 
     def data(self, recording):
         """Its periods."""

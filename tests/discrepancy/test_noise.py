@@ -1,0 +1,147 @@
+"""The noise floor of synthetic scatter is the scatter that was put in, and of a leg that lacks nothing it is right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.lack import lack_of_fit
+from sea_ident.discrepancy.noise import (
+    noise_beside_model,
+    noise_directions,
+    noise_from_periods,
+    stacked,
+    step_freedom,
+    unstacked,
+)
+from sea_ident.discrepancy.settle import settle
+
+HARMONICS = 150
+
+
+def scatter(rng, periods, mixing, offset=0.0):
+    """(P, H + 1, E) coefficients of periods whose real components have the covariance mixing mixing'."""
+    count = len(mixing)
+    shape = (periods, HARMONICS + 1, count)
+    values = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) @ mixing.T
+    values[:, 0] = values[:, 0].real
+    return values + offset
+
+
+MIXING = np.array([[1.0, 0.0, 0.0], [0.8, 0.5, 0.0], [-0.02, 0.01, 0.03]])
+
+
+def test_covariance_of_the_mean():
+    found = noise_from_periods(scatter(np.random.default_rng(1), 12, MIXING))
+    middle = np.mean(found.covariance[1:], axis=0)
+    np.testing.assert_allclose(middle, MIXING @ MIXING.T / 12, atol=0.15 * np.linalg.norm(MIXING @ MIXING.T) / 12)
+    # a real number for the constant, two for every harmonic
+    power = (2 * HARMONICS + 1) * np.diag(MIXING @ MIXING.T) / 12
+    np.testing.assert_allclose(found.std, np.sqrt(power), rtol=0.1)
+
+
+def test_a_drift_is_no_noise():
+    quiet = scatter(np.random.default_rng(1), 12, MIXING)
+    drift = 5.0 * np.linspace(-1.0, 1.0, 12)[:, None, None]
+    drifting, plain = noise_from_periods(quiet + drift), noise_from_periods(quiet)
+    # around their mean the periods are spread by three
+    assert np.all(drifting.std < 1.6 * plain.std[0] + plain.std)
+    assert np.std(drift) > 3.0
+
+
+@pytest.mark.parametrize("periods", [8, 20])
+def test_whitened_means_have_unit_variance(periods):
+    rng, values = np.random.default_rng(2), []
+    for _ in range(6):
+        each = scatter(rng, periods, MIXING)
+        whitener = noise_from_periods(each).whitener()
+        values.append(stacked(np.matmul(whitener, each.mean(axis=0)[:, :, None])[:, :, 0]))
+    assert np.mean(np.concatenate(values) ** 2) == pytest.approx(1.0, abs=0.12)
+
+
+def test_stacked_real_numbers_go_back():
+    rng = np.random.default_rng(3)
+    values = scatter(rng, 1, MIXING)[0]
+    np.testing.assert_array_equal(unstacked(stacked(values), 3), values)
+    np.testing.assert_array_equal(stacked(unstacked(stacked(values), 3)), stacked(values))
+
+
+@pytest.mark.parametrize("periods", [6, 12, 30])
+def test_degrees_of_freedom_of_successive_differences(periods):
+    """Twice the squared mean over the variance of the estimate, from many draws."""
+    steps = np.diff(np.random.default_rng(4).standard_normal((40000, periods)), axis=1)
+    estimate = np.mean(steps**2, axis=1) / 2.0
+    assert step_freedom(periods) == pytest.approx(2.0 * np.mean(estimate) ** 2 / np.var(estimate), rel=0.05)
+
+
+def test_a_model_that_takes_up_scatter_does_not_lower_the_floor_of_the_rest():
+    """White scatter stays white however many of its directions a model takes: the rest is scaled up for them."""
+    rng = np.random.default_rng(5)
+    residuals = scatter(rng, 15, np.eye(3))
+    plain = noise_from_periods(residuals)
+    size = len(stacked(residuals[0]))
+    basis = np.linalg.qr(rng.standard_normal((size, size // 4)))[0]
+    beside = noise_beside_model(residuals, plain, basis)
+    assert np.mean(beside.std / plain.std) == pytest.approx(1.0, abs=0.05)
+    assert beside.total_freedom == pytest.approx(0.75 * plain.total_freedom, rel=0.05)
+
+
+def test_what_the_model_takes_up_altogether_is_not_in_its_floor():
+    """A few directions that differ wildly from period to period, all of them free in the model."""
+    rng = np.random.default_rng(6)
+    quiet = scatter(rng, 15, np.eye(3))
+    plain = noise_from_periods(quiet)
+    wild = rng.standard_normal((len(stacked(quiet[0])), 4))
+    loud = np.stack([unstacked(stacked(r) + 30.0 * wild @ rng.standard_normal(4), 3) for r in quiet])
+    loud_floor = noise_from_periods(loud)
+    whitener = loud_floor.whitener()
+    flat = np.stack([stacked(np.matmul(whitener, unstacked(w, 3)[:, :, None])[:, :, 0]) for w in wild.T], axis=1)
+    beside = noise_beside_model(loud, loud_floor, np.linalg.qr(flat)[0])
+    assert np.all(loud_floor.std > 10.0 * plain.std)
+    np.testing.assert_allclose(beside.std, plain.std, rtol=0.15)
+
+
+def test_directions_of_white_scatter_are_all():
+    values = np.random.default_rng(7).standard_normal((12, 1500))
+    assert noise_directions(values) == pytest.approx(1500, rel=0.4)
+
+
+@pytest.mark.parametrize("rank", [3, 20, 100])
+def test_directions_of_scatter_of_low_rank_are_its_rank(rank):
+    rng = np.random.default_rng(8)
+    span = np.linalg.qr(rng.standard_normal((1500, rank)))[0]
+    found = [noise_directions(rng.standard_normal((25, rank)) @ span.T) for _ in range(20)]
+    assert np.median(found) == pytest.approx(rank, rel=0.25)
+
+
+def test_too_few_steps_tell_no_directions():
+    assert noise_directions(np.random.default_rng(9).standard_normal((4, 50))) == 50.0
+
+
+def test_a_leg_that_lacks_nothing_leaves_its_noise(laboratory, nothing_missing):
+    """Statistic over degrees of freedom near one, in all and for every equation, whatever the noise."""
+    found = [nothing_missing]
+    for seed in (4, 5):
+        bench = laboratory.bench(laboratory.record(seed=seed))
+        found.append((bench, settle(bench, bench.effects)))
+    for bench, now in found:
+        assert now.fit.statistic / now.fit.dof == pytest.approx(1.0, abs=0.15)
+        statistic, dof, p_value = lack_of_fit(bench, now)
+        assert (statistic, dof) == (now.fit.statistic, now.fit.dof)
+        assert p_value > 1e-3
+        clean = np.sqrt(np.sum(np.abs(bench.clean_residual(now.fit, now.noise)) ** 2, axis=0))
+        np.testing.assert_array_less(clean, 1.5 * now.noise.std)
+        np.testing.assert_array_less(0.5 * now.noise.std, clean)
+
+
+def test_a_model_that_is_wrong_by_a_twentieth_of_the_torque_is_seen(rippled):
+    bench, start, with_it = rippled
+    assert lack_of_fit(bench, start)[2] < 1e-6
+    assert start.fit.statistic / start.fit.dof > 3.0
+    assert with_it.fit.statistic / with_it.fit.dof == pytest.approx(1.0, abs=0.2)
+    assert lack_of_fit(bench, with_it)[2] > 1e-3
+    # its floor is that of the model without: noise, not misfit
+    wrong_scale = replace(start.noise, covariance=start.noise.covariance / 4.0)
+    assert bench.statistic(with_it.fit, wrong_scale) == pytest.approx(
+        4.0 * bench.statistic(with_it.fit, start.noise), rel=1e-6
+    )
