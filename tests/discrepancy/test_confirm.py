@@ -1,0 +1,109 @@
+"""What only the samples near reversals speak for is dropped, what holds elsewhere stays."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.candidates import effect_key, scan
+from sea_ident.discrepancy.confirm import confirm
+from sea_ident.discrepancy.data import around_reversals, away_from_reversals
+from sea_ident.discrepancy.search import Selection, without
+from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.effects import make_effect
+
+RIPPLE = make_effect("torque_ripple", "hip", order=4.0)
+AT_REVERSALS = make_effect("stribeck_friction", "knee", speed=0.05, exponent=2.0)
+
+
+def selected(bench, effects):
+    """A selection made by hand: the model, and the model with some effects more."""
+    start = settle(bench, bench.effects)
+    fit = bench.fit((*start.fit.effects, *effects), start.noise, start=start.fit.parameters)
+    now = Settled(fit, bench.noise(fit))
+    now = Settled(bench.fit(fit.effects, now.noise, start=fit.parameters), now.noise)
+    candidates = tuple(scan(bench, now.fit, now.noise))
+    p_values = tuple(1e-10 * (k + 1) for k in range(len(effects)))
+    return Selection(start, now, len(effects), p_values, candidates, 100)
+
+
+@pytest.fixture(scope="module")
+def both(laboratory):
+    """A ripple everywhere, and friction that is larger at the knee just where it turns."""
+    planted = [
+        ("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0}),
+        ("stribeck_friction", "knee", [1.5], {"speed": 0.03}),
+    ]
+    bench = laboratory.bench(laboratory.record(planted))
+    return bench, selected(bench, [AT_REVERSALS, RIPPLE])
+
+
+def test_before_confirmation_both_seem_to_be_there(both):
+    bench, selection = both
+    fit = selection.final.fit
+    for position in (-2, -1):
+        others = [e for e in fit.effects if e is not fit.effects[position]]
+        less = bench.fit(others, selection.final.noise, start=fit.parameters)
+        assert less.statistic - fit.statistic > 50.0
+
+
+def test_what_is_seen_only_near_reversals_is_dropped(both):
+    bench, selection = both
+    found = confirm(bench, selection)
+    assert [effect_key(e)[:2] for e in found.selection.effects] == [("torque_ripple", "hip")]
+    assert found.selection.p_values == (2e-10,)
+    # the model there is the one with what is left
+    assert [e.name for e in found.final.fit.effects[-1:]] == ["torque_ripple"]
+    assert found.bench.data.caution == 2
+
+
+def test_what_holds_elsewhere_stays_with_its_size(rippled):
+    bench, start, with_it = rippled
+    found = confirm(bench, Selection(start, with_it, 1, (1e-9,)))
+    assert found.selection.p_values == (1e-9,)
+    parameters = found.final.fit.parameters
+    assert parameters["hip.torque_ripple_sine"] == pytest.approx(1.0, abs=0.1)
+    assert parameters["hip.torque_ripple_cosine"] == pytest.approx(0.5, abs=0.1)
+    assert found.final.fit.statistic / found.final.fit.dof == pytest.approx(1.0, abs=0.2)
+    assert found.start.fit.statistic / found.start.fit.dof > 3.0
+
+
+def test_more_is_left_out_around_reversals(rippled):
+    data = rippled[0].data
+    away = away_from_reversals(data)
+    assert np.all(away.left_out[data.left_out])
+    assert np.mean(away.left_out) > 1.3 * np.mean(data.left_out)
+    for e, equation in enumerate(data.equations):
+        speed = data.motion.dq if str(equation.kind) == "link" else data.motion.dtheta
+        turns = np.flatnonzero(np.diff(np.sign(speed[:, equation.index])))
+        for turn in turns:
+            # four samples before the turn and four after it
+            assert np.all(away.left_out[np.arange(turn - 3, turn + 5) % data.samples, e])
+    alone = around_reversals(data.motion, data.equations)
+    assert np.all(data.left_out[alone])
+
+
+def test_without_removes_what_is_weak_and_fits_the_rest_anew(both):
+    bench, _ = both
+    extra = selected(bench, [AT_REVERSALS, RIPPLE, make_effect("torque_offset", "ankle")])
+    left = without(bench, extra, [0, 2])
+    assert [effect_key(e)[:2] for e in left.effects] == [("torque_ripple", "hip")]
+    assert left.added == 1
+    assert left.p_values == (2e-10,)
+    assert left.start is extra.start
+    names = {column.name for column in left.final.fit.columns}
+    assert "hip.torque_ripple_sine" in names
+    assert not names & {"knee.stribeck_friction", "ankle.torque_offset"}
+    # a minimum of its own: fitting again from the description changes nothing
+    again = bench.fit(left.final.fit.effects, left.final.noise)
+    assert again.statistic == pytest.approx(left.final.fit.statistic, rel=1e-4)
+    # what was taken out can be found again
+    assert ("stribeck_friction", "knee") in {c.key[:2] for c in left.candidates}
+
+
+def test_without_everything_is_the_start(both):
+    bench, selection = both
+    left = without(bench, selection, [0, 1])
+    assert left.effects == ()
+    assert [effect_key(e) for e in left.final.fit.effects] == [effect_key(e) for e in selection.start.fit.effects]
+    assert left.final.fit.statistic / left.final.fit.dof == pytest.approx(
+        selection.start.fit.statistic / selection.start.fit.dof, rel=0.05
+    )
