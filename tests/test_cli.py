@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sea_ident.cli import output
+
 DATA = Path(__file__).parents[1] / ".." / "shared" / "data"
 
 
@@ -57,6 +59,7 @@ def test_help_answers_without_loading_the_numerical_libraries():
         (("inspect", "no_such.urdf"), "no_such.urdf"),
         (("inspect", "exo_leg", "--joints", "hip,elbow"), "elbow"),
         (("inspect",), "ROBOT"),
+        (("simulate", "exo_leg", "--excitation", "none.json", "--out", "y.txt"), "'.txt' is not known"),
         (("inspekt", "exo_leg"), "inspekt"),
     ],
 )
@@ -293,3 +296,17 @@ def test_the_emps_axis_comes_out_as_published(tmp_path):
     assert found["slider.viscous_friction"] == pytest.approx(203.5034, rel=0.02)
     assert found["slider.coulomb_friction"] == pytest.approx(20.3935, rel=0.02)
     assert found["slider.torque_offset"] == pytest.approx(-3.1648, rel=0.03)
+
+
+def test_a_warning_is_told_once(capsys):
+    output.hold("the first")
+    output.hold("the second")
+    output.hold("the second")
+    output.emit({}, "result\n  warning: the first", as_json=False)
+    output.tell_held()
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("result\n  warning: the first\n", "warning: the second\n")
+    output.hold("the first")
+    output.emit({"warnings": ["the first"]}, "", as_json=True)
+    output.tell_held()
+    assert capsys.readouterr().err == "warning: the first\n"

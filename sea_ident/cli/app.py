@@ -10,7 +10,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from sea_ident import __version__
-from sea_ident.cli.output import Interrupted, note
+from sea_ident.cli.output import Interrupted, hold, note, tell_held
 from sea_ident.cli.verbs import VERBS
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 
@@ -53,7 +53,7 @@ def _interrupt(*_: object) -> NoReturn:
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
     if issubclass(category, SeaIdentWarning):
-        note(f"warning: {message}")
+        hold(str(message))
 
 
 def main() -> None:
@@ -67,7 +67,10 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     try:
-        app(prog_name="sea-ident")
+        try:
+            app(prog_name="sea-ident")
+        finally:
+            tell_held()
     except SeaIdentError as error:
         note(f"error: {error}")
         sys.exit(BAD_INPUT)

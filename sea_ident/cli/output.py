@@ -54,11 +54,28 @@ def emit(record: Mapping[str, Any], text: str, *, as_json: bool) -> None:
         print(json.dumps(plain(record), indent=1, allow_nan=False))
     else:
         print(text)
+        _held[:] = [warning for warning in _held if warning not in text]
 
 
 def note(text: str) -> None:
     """A line for people, on standard error."""
     print(text, file=sys.stderr, flush=True)
+
+
+_held: list[str] = []
+
+
+def hold(warning: str) -> None:
+    """Keep a warning for the end: the result that is printed tells most of them itself."""
+    if warning not in _held:
+        _held.append(warning)
+
+
+def tell_held() -> None:
+    """Tell the warnings that no result has told."""
+    for warning in _held:
+        note(f"warning: {warning}")
+    _held.clear()
 
 
 def check_targets(*targets: Path | None, inputs: Iterable[Path | str | None] = ()) -> None:

@@ -132,8 +132,8 @@ def _doubts(model: Model) -> list[str]:
     found.extend(f"spring of {s.joint}: {s.note}" for s in model.springs if s.verdict in UNSAFE)
     found.extend(
         f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g}, "
-        f"deflection up to {s.largest_deflection:.3g}): have the encoders of link and motor different zeros (unknown_zero, "
-        "on the command line --unknown-zero), or has one of them the wrong sign?"
+        f"deflection {s.largest_deflection:.3g} at most): have the encoders of link and motor different zeros "
+        "(unknown_zero, on the command line --unknown-zero), or has one of them the wrong sign?"
         for s in model.springs
         if s.stiffness < -5.0 * s.stiffness_std
     )

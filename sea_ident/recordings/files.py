@@ -107,14 +107,24 @@ def write_recording(recording: Recording, path: str | Path) -> None:
         MissingExtraError: the format needs a package that is not installed.
     """
     path = Path(path)
+    check_suffix(path)
     suffix = path.suffix.lower()
     if suffix == "":
         with atomic_directory(path) as temporary, _named(path):
             _ROS2_BAG.write(recording, temporary)
-    elif suffix in _FORMATS:
+    else:
         with atomic_file(path) as temporary, _named(path):
             _FORMATS[suffix].write(recording, temporary)
-    else:
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse, before any work, a name that `write_recording` could not write.
+
+    Raises:
+        RecordingError: its suffix is not known.
+    """
+    suffix = path.suffix.lower()
+    if suffix and suffix not in _FORMATS:
         raise RecordingError(_unknown_suffix(path))
 
 

@@ -28,9 +28,11 @@ def simulate(
     """
     from sea_ident.excitation import read_excitation
     from sea_ident.recordings import write_recording
+    from sea_ident.recordings.files import check_suffix
     from sea_ident.simulation import simulate as run
 
     check_targets(out, inputs=(robot, annotation, excitation))
+    check_suffix(out)
     loaded = read_robot(robot, annotation, joints)
     reference = read_excitation(excitation)
     with progress("waiting for the motion to be periodic", periods) as tell:
