@@ -14,7 +14,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
-from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
@@ -27,9 +27,6 @@ FEWEST_PERIODS = 10
 
 LARGEST_LEFT = 0.1
 """Share of the torque that may be left beside what few periods name [-]."""
-
-LACK_LEVEL = 1e-3
-"""Probability below which a remainder counts as something that is missing."""
 
 LARGEST_REMAINDER = 3e-3
 """Share of the torque that may be left as what no model has [-]."""
@@ -78,6 +75,8 @@ def conclude(
     missing.sort(key=lambda m: -m.torque_share)
     unexplained = max(left - left_dof, 0.0) / max(statistic - dof, 1.0) if selection.added else 1.0
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes)
+    if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
+        verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     facts = words.Facts(

@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import away_from_reversals
 from sea_ident.discrepancy.judge import significance, torque_change
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
@@ -20,12 +22,15 @@ class Confirmed:
         bench: the recording with more left out around the reversals.
         start: the model without anything added, there.
         final: the model with the effects added, there.
+        among_the_slow: rms of what the model leaves among slow samples that were left out, as a share of the torque
+            [-].
     """
 
     selection: Selection
     bench: Bench
     start: Settled
     final: Settled
+    among_the_slow: float = 0.0
 
     def less(self, selection: Selection) -> "Confirmed":
         """The same with less found."""
@@ -39,8 +44,11 @@ FAR = 6
 MOST_LEFT_OUT = 0.6
 """Share of the samples of an equation beyond which too little is left to search [-]."""
 
+PROMISING = 0.3
+"""Share of the excess there that a candidate must promise to explain for the search to be repeated [-]."""
+
 RESOLVED = 0.5
-"""Share of the misfit that the repeated search may leave of what the first left there, to be the better one [-]."""
+"""Share of the misfit that the repeated search may leave of what the first left there, where it leaves any [-]."""
 
 
 def confirm(bench: Bench, selection: Selection) -> Confirmed:
@@ -87,9 +95,16 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     if np.any(np.mean(data.left_out, axis=0) > MOST_LEFT_OUT):
         return None
     far = Bench(data, bench.effects)
-    first = settle_again(far, confirmed.final.fit).fit
+    before = settle_again(far, confirmed.final.fit)
+    first = before.fit
+    most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
+    if most < PROMISING * first.excess:
+        return None
     found = search(far, bench.effects)
     fit = found.final.fit
-    if not found.added or fit.statistic / fit.dof > RESOLVED * first.statistic / first.dof:
+    explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
+    if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):
         return None
-    return Confirmed(found, far, found.start, found.final)
+    everywhere = settle_again(confirmed.bench, fit)
+    left = remainder_share(confirmed.bench, everywhere)
+    return Confirmed(found, far, found.start, found.final, left)

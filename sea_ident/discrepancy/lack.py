@@ -9,6 +9,9 @@ from sea_ident.discrepancy.judge import flat_periods
 from sea_ident.discrepancy.noise import noise_directions, step_freedom
 from sea_ident.discrepancy.settle import Settled
 
+LACK_LEVEL = 1e-3
+"""Probability below which a remainder counts as something that is missing."""
+
 
 def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
     """Test a fit against the noise alone.

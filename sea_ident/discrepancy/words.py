@@ -63,8 +63,8 @@ def slow_samples(data: PeriodData) -> str:
     equation = data.equations[worst]
     return (
         f"samples in which a joint hardly moves were left out, up to {shares[worst]:.0%} ({equation.kind} of "
-        f"{equation.joint}): there the torque of friction follows from a velocity that is hardly more than its noise. "
-        "Let the joints pass zero velocity faster"
+        f"{equation.joint}): there friction follows from a velocity that is hardly more than its noise, and what is "
+        "named does not explain them. Let the joints pass zero velocity faster"
     )
 
 

@@ -1,0 +1,68 @@
+"""Where a motor lingers, what no model has must not hide what the rest of the motion shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.conclude import unexplained
+from sea_ident.discrepancy.confirm import confirm, without_the_slow
+from sea_ident.discrepancy.data import away_from_reversals, period_data, wide_processing
+from sea_ident.discrepancy.search import search
+from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.motion import FourierSeries
+from sea_ident.simulation import PlantedEffect, simulate
+
+PERIOD = 5.0
+
+
+@pytest.fixture(scope="module")
+def lingering():
+    """A ripple at a hip that lingers twice in a period, and there a torque that no model has."""
+    leg = sea_ident.load_robot("exo_leg")
+    series = sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=0).series
+    motion = series.sample(samples=1000)
+    phase = 2 * np.pi * motion.time / PERIOD
+    velocity = np.sin(phase) ** 3 * (1 + 0.6 * np.cos(2 * phase))
+    path = np.cumsum(velocity - velocity.mean())
+    q = motion.q.copy()
+    q[:, 0] = 0.35 + 0.5 * (path - path.mean()) / np.ptp(path)
+    slow = FourierSeries.fit(motion.time, q, 1 / PERIOD, 12)
+    ripple = PlantedEffect(make_effect("torque_ripple", "hip", order=19.0), np.array([0.3, 0.2]))
+    recording = simulate(leg, slow, periods=10, seed=5, effects=(ripple,)).recording
+    data = period_data(wide_processing(recording, leg, PERIOD), leg)
+    speed = data.motion.dtheta[:, 0]
+    # known to its spread between the periods; up to four times that is left out anyway
+    spread = np.std([m.dtheta[:, 0] for m in data.period_motions], axis=0).mean()
+    stick = 4.0 * np.sign(np.gradient(speed)) * (np.abs(speed) < 10.0 * spread)
+    torque = np.stack([stick, np.zeros_like(stick), np.zeros_like(stick)], axis=1)
+    return replace(data, tau_motor=data.tau_motor + torque, period_tau_motor=data.period_tau_motor + torque)
+
+
+def named(selection):
+    return [(effect.name, effect.joint) for effect in selection.effects]
+
+
+def test_the_search_without_the_slow_samples_finds_what_they_hide(lingering):
+    leg = lingering.robot
+    bench = Bench(lingering, (*base_effects(leg), *spring_effects(leg)))
+    confirmed = confirm(bench, search(bench, bench.effects))
+    assert unexplained(confirmed)
+    second = without_the_slow(bench, confirmed)
+    assert second is not None
+    assert named(second.selection) == [("torque_ripple", "hip")]
+    assert second.final.fit.effects[-1].order == pytest.approx(19.0, abs=0.5)
+    assert not unexplained(second)
+    # what is there all the same is not forgotten
+    assert second.among_the_slow > 0.01
+    assert second.bench.data.caution > 1
+    assert second.bench.data.left_out[:, 0].mean() > bench.data.left_out[:, 0].mean()
+
+
+def test_more_caution_leaves_out_more_and_nothing_else(lingering):
+    far = away_from_reversals(lingering, 6)
+    assert np.all(far.left_out >= lingering.left_out)
+    assert far.left_out.mean() > lingering.left_out.mean()
+    np.testing.assert_array_equal(far.tau_motor, lingering.tau_motor)
