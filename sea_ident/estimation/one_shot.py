@@ -8,7 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Effect
-from sea_ident.estimation.estimators.weights import LEAST_REST
+from sea_ident.estimation.estimators.weights import LEAST_REST, steady
 from sea_ident.estimation.identify import identify
 from sea_ident.estimation.model import Model
 from sea_ident.estimation.observations import Observations, Rows, SpringSide
@@ -43,6 +43,7 @@ def identify_one_shot(
     Each kind of row is weighted by its own scatter between periods: link rows have no torque noise, so they weigh much
     more and tie the parameters to each other, while the motor rows give the scale. Products are taken between different
     periods only; otherwise noise in the link rows, whose right-hand side is zero, would shrink everything.
+    Motor rows near reversal where friction varies from pass to pass count less or not at all, see `steady`.
 
     Args:
         robot: the robot, with at least one spring.
@@ -180,7 +181,7 @@ class _Whitening:
         gains = np.sqrt(samples / power)
         # beyond the harmonics kept, linear terms were cut off while products still reach there
         gains[min(observations.processed.link_harmonics, observations.processed.motor_harmonics) + 1 :] = 0.0
-        valid, own = observations.valid, scatter[:, :, links:]
+        valid, own = observations.valid * steady(observations), scatter[:, :, links:]
         variance = smooth_over_phase((own**2).sum(axis=0), observations.processed.interval, SMOOTHING)
         variance = variance / (periods * (periods - 1.0))
         count = np.maximum(valid.sum(axis=0), 1.0)

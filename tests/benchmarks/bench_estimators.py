@@ -26,10 +26,11 @@ from experiments import Found, each_seed
 from scipy.signal import lfilter
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from estimation.emps import EFFECTS, IDENTIFICATION, PUBLISHED
 from estimation.synthetic import Truth, leg_series, truth_of
 
 from sea_ident.base_parameters import find_base_parameters
-from sea_ident.effects import base_effects, make_effect
+from sea_ident.effects import base_effects
 from sea_ident.estimation import (
     InstrumentalVariables,
     JointWLS,
@@ -68,9 +69,6 @@ EXTRA = tuple(SETTINGS)[4:]
 HARMONICS = 150
 """Kept in q and theta: real friction bends the motion at every reversal, so that data ask for as many. Of these smooth
 motions a tenth would do, and encoder noise up to a hundred times as large would do no harm."""
-
-PUBLISHED = {"M [kg]": 95.1089, "Fv [N s/m]": 203.5034, "Fc [N]": 20.3935, "offset [N]": -3.1648}
-EMPS = Path(__file__).parents[2] / ".." / "shared" / "data" / "emps" / "identification.csv"
 
 
 def measured(
@@ -175,18 +173,12 @@ def table(title: str, names: tuple[str, ...], results: list[dict]) -> None:
 
 def emps() -> None:
     """The electro-mechanical positioning system: all estimators beside the published values."""
-    if not EMPS.is_file():
-        print(f"\nEMPS: no recording at {EMPS}")
+    if not IDENTIFICATION.is_file():
+        print(f"\nEMPS: no recording at {IDENTIFICATION}")
         return
     warnings.simplefilter("ignore")
     robot = load_robot("emps")
-    effects = (
-        make_effect("rigid_bodies"),
-        make_effect("viscous_friction", "slider"),
-        make_effect("coulomb_friction", "slider", smoothing=1e-3),
-        make_effect("torque_offset", "slider"),
-    )
-    processed = process(read_recording(EMPS), robot)
+    processed = process(read_recording(IDENTIFICATION), robot)
     print(f"\n### EMPS, {processed.periods} periods of {processed.period:g} s\n")
     print(
         "Value +- stated standard deviation (repeatability: the part of it that the scatter between periods shows).\n"
@@ -195,7 +187,7 @@ def emps() -> None:
     print("|---|---|---|---|---|")
     print("| published | " + " | ".join(f"{value:.4f}" for value in PUBLISHED.values()) + " |")
     for estimator in ESTIMATORS:
-        model = identify(robot, processed, effects=effects, estimator=estimator)
+        model = identify(robot, processed, effects=EFFECTS, estimator=estimator)
         scatter = np.sqrt(np.diag(model.uncertainty.repeatability))
         cells = [f"{v:.3f} +- {s:.2g} ({r:.2g})" for v, s, r in zip(model.values, model.std, scatter, strict=True)]
         print(f"| {estimator.name} | " + " | ".join(cells) + " |", flush=True)

@@ -1,10 +1,10 @@
 """Do the intervals hold the truth, is the estimate unbiased, and what is weighting by sample worth?
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--keep FILE]
-        [--estimators default "one variance per joint"]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--first 0]
+        [--estimators default "one shot"] [--pool 1] [--keep FILE]
 
 Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with and without friction that
-varies from pass to pass. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
+varies from pass to pass, and with a period that is a copy and left out. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
 95 % interval. For the weightings: mean squared error relative to one variance per joint, and rms of the torque error
 on a gait that was not used. The first hundred seeds have simulated passes of their own, the others share halves of
 them (see experiments.py). With 200 seeds a coverage is known to 1.5 %, a bias to 0.07 of the standard deviation. What
@@ -35,6 +35,7 @@ from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import honest_uncertainty
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.processing import process
+from sea_ident.recordings import Recording
 from sea_ident.simulation import FrictionJitter
 
 PERIODS = 20
@@ -48,6 +49,14 @@ ESTIMATORS = {
     "per sample, smoothed": PerSampleWLS(),
     "default": InstrumentalVariables(),
 }
+ONE_SHOT = "one shot"
+
+SETTINGS = (
+    ("friction varies from pass to pass", "jitter", {}, None),
+    ("friction varies from pass to pass, period 11 of 20 is a copy", "jitter", {}, 10),
+    ("every pass alike", "steady", {"jitter": FrictionJitter.none()}, None),
+)
+"""Title, pool, its settings, and which period is a copy."""
 
 
 def gait(robot) -> Motion:
@@ -61,8 +70,18 @@ def gait(robot) -> Motion:
     return series.sample(samples=400)
 
 
+def with_copy(recording: Recording, period: int) -> Recording:
+    """The recording with one of its periods overwritten by the one before, so that it will be left out."""
+    columns = {}
+    for name, values in recording.columns.items():
+        parts = values.reshape(PERIODS, -1).copy()
+        parts[period] = parts[period - 1]
+        columns[name] = parts.ravel()
+    return recording.replace_columns(columns)
+
+
 def one_seed(
-    pool: Pool, sensors: Sensors, labels: list[str], springs: bool, seed: int
+    pool: Pool, sensors: Sensors, labels: list[str], copied: int | None, seed: int
 ) -> dict[str, tuple[np.ndarray, ...]]:
     """Per estimator: error, standard deviation and half width of every parameter."""
     warnings.simplefilter("ignore")
@@ -70,26 +89,26 @@ def one_seed(
     effects = base_effects(robot)
     base = find_base_parameters(robot, effects)
     exact = base.project(pool.truth)
-    processed = process(draw(pool, seed, PERIODS, sensors), robot, period=10.0)
+    recording = draw(pool, seed, PERIODS, sensors)
+    processed = process(recording if copied is None else with_copy(recording, copied), robot, period=10.0)
     observations = Observations(robot, effects, base, processed)
     found = {}
     for name in labels:
-        estimator = ESTIMATORS[name]
-        estimate = estimator.estimate(observations)
-        uncertainty = honest_uncertainty(observations, estimate)
-        error, std, half = estimate.values - exact, uncertainty.std, uncertainty.half_width()
-        if springs and name == "default":
-            laws = springs_from(observations, estimate.values, uncertainty)
-            error, std, half = joined(error, std, half, laws, pool)
-        found[name] = (error, std, half)
-    if springs and len(labels) == len(ESTIMATORS):
-        model = identify_one_shot(robot, processed)
-        parts = (model.values - exact, model.std, model.uncertainty.half_width())
-        found["one shot"] = joined(*parts, model.springs, pool)
+        if name == ONE_SHOT:
+            model = identify_one_shot(robot, processed)
+            values, uncertainty, laws = model.values, model.uncertainty, model.springs
+        else:
+            estimate = ESTIMATORS[name].estimate(observations)
+            uncertainty, values = honest_uncertainty(observations, estimate), estimate.values
+            laws = springs_from(observations, values, uncertainty) if name == "default" else ()
+        found[name] = joined(values - exact, uncertainty.std, uncertainty.half_width(), laws, pool)
     return found
 
 
 def joined(error, std, half, laws, pool):
+    """The same with the springs, where there are any."""
+    if not laws:
+        return error, std, half
     values = np.ravel([[s.stiffness, s.cubic_stiffness, s.damping] for s in laws])
     spread = np.ravel([[s.stiffness_std, s.cubic_stiffness_std, s.damping_std] for s in laws])
     width = np.ravel([s.half_width() for s in laws])
@@ -134,20 +153,19 @@ def weightings(pool: Pool, results: list[dict]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=200)
-    parser.add_argument("--estimators", nargs="+", choices=ESTIMATORS, default=list(ESTIMATORS))
+    parser.add_argument("--estimators", nargs="+", choices=[*ESTIMATORS, ONE_SHOT], default=[*ESTIMATORS, ONE_SHOT])
+    parser.add_argument("--first", type=int, default=0, help="seed to begin with")
+    parser.add_argument("--pool", type=int, default=1, help="seed of the simulated passes")
     parser.add_argument("--keep", type=Path, help="file of seeds that are done; a run that was cut goes on from it")
     arguments = parser.parse_args()
-    for title, name, settings in (
-        ("friction varies from pass to pass", "jitter", {}),
-        ("every pass alike", "steady", {"jitter": FrictionJitter.none()}),
-    ):
+    seeds = range(arguments.first, arguments.first + arguments.seeds)
+    for title, name, settings, copied in SETTINGS:
         begin = time.process_time()
-        pool = cached_pool(name, PASSES if name == "jitter" else 2 * PERIODS, 1, **settings)
+        pool = cached_pool(name, PASSES if name == "jitter" else 2 * PERIODS, arguments.pool, **settings)
         names = find_base_parameters(pool.robot, base_effects(pool.robot)).names
         names = [*names, *(f"{j} {k}" for j in pool.robot.joint_names for k in ("K1", "K3", "D"))]
-
-        run = partial(one_seed, pool, Sensors(), arguments.estimators, name == "jitter")
-        results = each_seed(arguments.keep, name, range(arguments.seeds), run)
+        run = partial(one_seed, pool, Sensors(), arguments.estimators, copied)
+        results = each_seed(arguments.keep, f"{title}, pool {arguments.pool}", seeds, run)
         table(title, names, results)
         weightings(pool, results)
         print(f"\n  {time.process_time() - begin:.0f} s of CPU time", flush=True)

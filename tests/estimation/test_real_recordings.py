@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sea_ident.effects import make_effect
+from estimation import emps as emps_facts
 from sea_ident.estimation import (
     InstrumentalVariables,
     JointWLS,
@@ -30,7 +30,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning"),
 ]
 
-PUBLISHED = np.array([95.1089, 203.5034, 20.3935, -3.1648])  # M [kg], Fv [N s/m], Fc [N], offset [N]
+PUBLISHED = np.array(list(emps_facts.PUBLISHED.values()))
 
 
 @pytest.fixture(scope="module")
@@ -40,18 +40,12 @@ def emps():
 
 @pytest.fixture(scope="module")
 def emps_model():
-    # v_off well below the speeds of the axis (0.125 m/s), as the published model has a sign function
-    return (
-        make_effect("rigid_bodies"),
-        make_effect("viscous_friction", "slider"),
-        make_effect("coulomb_friction", "slider", smoothing=1e-3),
-        make_effect("torque_offset", "slider"),
-    )
+    return emps_facts.EFFECTS
 
 
 @pytest.fixture(scope="module")
 def emps_data(emps):
-    recording = read_recording(DATA / "emps" / "identification.csv")
+    recording = read_recording(emps_facts.IDENTIFICATION)
     return process(recording, emps)
 
 

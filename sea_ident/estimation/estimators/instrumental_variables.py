@@ -45,19 +45,17 @@ class InstrumentalVariables(Estimator):
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
         first = sample_weights(observations, self.smoothing, steady(observations))
-        return (
-            self._other_periods(observations, first) if self.simulator is None else self._simulated(observations, first)
-        )
-
-    def _simulated(self, observations: Observations, first: SampleWeights) -> Estimate:
         if self.simulator is None:
-            raise IdentificationError("instrumental variables: no simulator was given")
+            return _other_periods(observations, first)
+        return self._simulated(observations, first, self.simulator)
+
+    def _simulated(self, observations: Observations, first: SampleWeights, simulator: Simulator) -> Estimate:
         rows, torque, weights, values = observations.rows, observations.torque, first.weights, first.solution.values
         count = rows.shape[-1]
         flat = rows.reshape(-1, count)
         moved = np.inf
         for _ in range(self.rounds):
-            motion = self.simulator(observations, values)
+            motion = simulator(observations, values)
             if len(motion) != len(rows):
                 raise IdentificationError(
                     f"the simulated motion has {len(motion)} samples, the mean period has {len(rows)}; give it at the "
@@ -69,52 +67,45 @@ class InstrumentalVariables(Estimator):
             moved = float(np.max(np.abs(values - before) / np.maximum(np.abs(values), 1e-12)))
             if moved < 1e-4:
                 break
-        inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
-        meat = np.einsum("knb,kn,knc->bc", instruments, first.variance, instruments)
-        return Estimate(
-            values=values,
-            instruments=instruments,
-            inverse=inverse,
-            weights=weights,
-            covariance=inverse @ meat @ inverse.T,
-            log_det_weighted=first.solution.log_det,
-            notes=(
-                *first.notes,
-                f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round",
-            ),
-            warnings=first.warnings,
-        )
+        note = f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round"
+        return _estimate(first, values, instruments, cross, note)
 
-    def _other_periods(self, observations: Observations, first: SampleWeights) -> Estimate:
-        processed, weights = observations.processed, first.weights
-        periods = processed.periods
-        if periods < 2:
-            raise IdentificationError(
-                f"{processed.source}: instruments from other periods need at least two periods; give a simulator"
-            )
-        count = observations.base.rank
-        whole = np.zeros_like(observations.rows)
-        for rows in observations.each_period():
-            whole += rows.total
-        cross, side = np.zeros((count, count)), np.zeros(count)
-        for p, rows in enumerate(observations.each_period()):
-            instruments = (whole - rows.total) / (periods - 1.0) * weights[:, :, None]
-            cross += instruments.reshape(-1, count).T @ rows.total.reshape(-1, count)
-            side += np.einsum("knb,kn->b", instruments, processed.period_tau_motor[p])
-        values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
-        inverse: FloatArray = np.asarray(np.linalg.inv(cross / periods), dtype=np.float64)
-        instruments = whole / periods * weights[:, :, None]
-        meat = np.einsum("knb,kn,knc->bc", instruments, first.variance, instruments)
-        return Estimate(
-            values=values,
-            instruments=instruments,
-            inverse=inverse,
-            weights=weights,
-            covariance=inverse @ meat @ inverse.T,
-            log_det_weighted=first.solution.log_det,
-            notes=(
-                *first.notes,
-                "the instruments of every period are the regressors of the other periods",
-            ),
-            warnings=first.warnings,
+
+def _other_periods(observations: Observations, first: SampleWeights) -> Estimate:
+    processed, weights = observations.processed, first.weights
+    periods = processed.periods
+    if periods < 2:
+        raise IdentificationError(
+            f"{processed.source}: instruments from other periods need at least two periods; give a simulator"
         )
+    count = observations.base.rank
+    whole = np.zeros_like(observations.rows)
+    for rows in observations.each_period():
+        whole += rows.total
+    cross, side = np.zeros((count, count)), np.zeros(count)
+    for p, rows in enumerate(observations.each_period()):
+        instruments = (whole - rows.total) / (periods - 1.0) * weights[:, :, None]
+        cross += instruments.reshape(-1, count).T @ rows.total.reshape(-1, count)
+        side += np.einsum("knb,kn->b", instruments, processed.period_tau_motor[p])
+    values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
+    mean_instruments = whole / periods * weights[:, :, None]
+    note = "the instruments of every period are the regressors of the other periods"
+    return _estimate(first, values, mean_instruments, cross / periods, note)
+
+
+def _estimate(
+    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, note: str
+) -> Estimate:
+    """Values with their covariance by eq. 13, from instruments (N, n, b) and their products with the rows (b, b)."""
+    inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
+    meat = np.einsum("knb,kn,knc->bc", instruments, first.variance, instruments)
+    return Estimate(
+        values=values,
+        instruments=instruments,
+        inverse=inverse,
+        weights=first.weights,
+        covariance=inverse @ meat @ inverse.T,
+        log_det_weighted=first.solution.log_det,
+        notes=(*first.notes, note),
+        warnings=first.warnings,
+    )
