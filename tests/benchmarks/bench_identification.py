@@ -3,12 +3,12 @@
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--first 0]
         [--estimators default "one shot"] [--pool 1] [--keep FILE]
 
-Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with and without friction that
-varies from pass to pass, and with a period that is a copy and left out. Per parameter: bias and stated standard deviation in units of the true one, coverage of the
-95 % interval. For the weightings: mean squared error relative to one variance per joint, and rms of the torque error
-on a gait that was not used. The first hundred seeds have simulated passes of their own, the others share halves of
-them (see experiments.py). With 200 seeds a coverage is known to 1.5 %, a bias to 0.07 of the standard deviation. What
-it printed is in results/identification.md.
+Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with friction that varies from
+pass to pass, the same with a period that is a copy and therefore left out, and with every pass alike. Per parameter:
+bias and stated standard deviation in units of the true one, coverage of the 95 % interval. For the weightings: mean
+squared error relative to one variance per joint, and rms of the torque error on a gait that was not used. The first
+hundred seeds have simulated passes of their own, the others share halves of them (see experiments.py). With 200 seeds
+a coverage is known to 1.5 %, a bias to 0.07 of the standard deviation. What it printed is in results/identification.md.
 """
 
 import argparse
