@@ -19,6 +19,7 @@ from sea_ident.estimation import (
 )
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.processing import process
+from sea_ident.processing.periods import detect_period
 from sea_ident.recordings import Recording, read_recording
 from sea_ident.regressor import prior_parameters
 from sea_ident.robot import load_robot
@@ -169,6 +170,24 @@ def test_stated_repeatability_is_the_scatter_between_real_periods(name, emps_mod
     assert any("whole periods differ" in text for text in model.warnings) == (name == "emps")
     # what the model lacks counts, too: what is stated in all is never less than the scatter
     assert np.all(model.std > scatter)
+
+
+def test_hebi_repeats_after_a_second_whatever_its_beginning():
+    recording = read_recording(DATA / "hebi_x5" / "example_log.csv")
+    even = np.linspace(recording.time[0], recording.time[-1], recording.samples)
+    q = np.interp(even, recording.time, recording.columns["q_output"])[:, None]
+    found = detect_period(even, q)
+    assert found == pytest.approx(1.0, abs=2e-4)  # the first second, from rest, would make it 0.998
+    # evidence: a series of that period leaves of the rest no more than noise, of any other period much more
+    later = recording.time > recording.time[0] + 1.5
+    left = []
+    for period in (found, 0.998, 1.002):
+        phase = 2.0 * np.pi * np.outer(recording.time[later] / period, np.arange(1, 6))
+        columns = np.column_stack([np.ones(len(phase)), np.sin(phase), np.cos(phase)])
+        signal = recording.columns["q_output"][later]
+        left.append(np.std(signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]))
+    assert left[0] < 2e-3
+    assert min(left[1:]) > 5.0 * left[0]
 
 
 def test_hebi_names_the_missing_torque_constant():
