@@ -8,16 +8,22 @@ With the reference that was recorded and the controller that followed it, the bi
 measured motion and torque of the motors stand in for it: bias = tau + position_gain theta + velocity_gain theta'. A
 model that is right then moves exactly as the robot did, whatever the gains; with the gains of the robot's own
 controller, one that is wrong also goes wrong by as much as it would in the robot's place.
+
+What is measured is noisy. Its noise cancels in the product of deviations that have none of it in common: those of
+different periods from a simulation that is driven by a reference, or those of two simulations, each driven by one half
+of the periods and compared with that half.
 """
 
 import warnings as python_warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.findings import Gap
+from sea_ident.effects import corrected_motion
+from sea_ident.effects.signal import SignalEffect
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion
@@ -43,6 +49,15 @@ REPRODUCED = 0.05
 
 REFERENCE_HARMONICS = 100
 """Harmonics of a recorded reference."""
+
+FEWEST_TO_HALVE = 4
+"""Periods from which on two simulations are driven by half of them each."""
+
+SIGNALS = ("q", "theta", "tau")
+"""What is compared."""
+
+SEEN = 2.0
+"""Standard deviations of its noise beyond which the mean square of a deviation is more than noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +87,7 @@ class MeasuredDrive(Controller):
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the motors were told to do in a recording.
+    """What the motors were told to do in a recording: a reference that a controller follows.
 
     Attributes:
         controller: how they were driven.
@@ -84,6 +99,52 @@ class Command:
     controller: Controller
     reference: FourierSeries
     note: str
+
+    def parts(self, processed: ProcessedRecording) -> tuple[ProcessedRecording, ...]:
+        """The parts of a recording that a model is driven by, one simulation each."""
+        return (processed,)
+
+    def driving(self, model: Model, part: ProcessedRecording) -> Controller:
+        """What drives a model."""
+        return self.controller
+
+
+@dataclass(frozen=True, eq=False)
+class StandIn(Command):
+    """The measured motion and torque of the motors in the place of a reference, with the gains of the controller."""
+
+    def parts(self, processed: ProcessedRecording) -> tuple[ProcessedRecording, ...]:
+        """Every other period, and those between: their noises are independent."""
+        if len(processed.period_motions) < FEWEST_TO_HALVE:
+            return (processed,)
+        return tuple(_some_periods(processed, first) for first in (0, 1))
+
+    def driving(self, model: Model, part: ProcessedRecording) -> Controller:
+        """What drives a model: motion and torque as they were by what the model says of the sensors."""
+        return MeasuredDrive(*actual(model, part), self.controller)
+
+
+def _some_periods(processed: ProcessedRecording, first: int) -> ProcessedRecording:
+    motions = processed.period_motions[first::2]
+    torques = processed.period_tau_motor[first::2]
+    return replace(
+        processed,
+        motion=Motion.mean(motions),
+        tau_motor=torques.mean(axis=0),
+        periods=len(motions),
+        period_motions=motions,
+        period_tau_motor=torques,
+        places=processed.places[first::2],
+    )
+
+
+def actual(model: Model, processed: ProcessedRecording) -> tuple[Motion, FloatArray]:
+    """Motion, and torque (N, n) of the motors, as they were by what a model says of the sensors [N m] or [N]."""
+    tau = processed.tau_motor
+    for effect in model.effects:
+        if isinstance(effect, SignalEffect):
+            tau = effect.delivered(model.robot, processed.motion.time, tau)
+    return corrected_motion(model.robot, model.effects, processed.motion), tau
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,28 +180,71 @@ def simulation_gap(
     Returns:
         The gaps; none where a model cannot be simulated, with the reason in the notes.
     """
-    command = command_of(before.robot, recording, processed, controller)
+    command = command_of(after, recording, processed, controller)
     notes = [command.note] if command.note else []
-    measured = {"q": processed.motion.q, "theta": processed.motion.theta, "tau": processed.tau_motor}
-    periods = {
-        "q": np.stack([m.q for m in processed.period_motions]),
-        "theta": np.stack([m.theta for m in processed.period_motions]),
-        "tau": processed.period_tau_motor,
-    }
-    runs = []
+    parts = command.parts(processed)
+    deviations = []
     for label, model in (("before", before), ("after", after)):
         try:
-            runs.append(simulated(model, command, processed))
+            runs = [simulated(model, command, part) for part in parts]
         except SeaIdentError as error:
             notes.append(f"no forward simulation of the model {label} the repair: {error}")
             return SimulationGap({}, tuple(notes))
+        deviations.append([deviations_of(run, part, len(parts) > 1) for run, part in zip(runs, parts, strict=True)])
     names = before.robot.joint_names
-    gaps = {}
-    for kind, mean in measured.items():
-        noise = np.sqrt(np.mean(np.var(periods[kind], axis=0, ddof=1), axis=0) / len(periods[kind]))
-        rms = [np.sqrt(np.maximum(np.mean((run[kind] - mean) ** 2, axis=0) - noise**2, 0.0)) for run in runs]
+    gaps, unseen = {}, {}
+    for kind in SIGNALS:
+        both = [np.concatenate([part[kind] for part in model]) for model in deviations]
+        floor = SEEN * spread_of_power(_of_periods(processed, kind))
+        powers = [common_power(values) for values in both]
+        seen = np.any([power > floor for power in powers], axis=0)
+        rms = [np.sqrt(np.where(seen, np.maximum(power, 0.0), 0.0)) for power in powers]
+        noise = np.sqrt(noise_power(both[1]))
         gaps[kind] = Gap(*(dict(zip(names, map(float, values), strict=True)) for values in (*rms, noise)))
+        unseen[kind] = [name for name, there in zip(names, seen, strict=True) if not there]
+    if unseen["q"]:
+        notes.append(
+            f"forward simulation of q at {', '.join(unseen['q'])}: before and after the repair within the noise of the "
+            "recording, so that nothing can be said of how much the gap shrinks there"
+        )
     return SimulationGap(gaps, tuple(notes))
+
+
+def _of_periods(processed: ProcessedRecording, kind: str) -> FloatArray:
+    """(P, N, n) a signal in every period."""
+    if kind == "tau":
+        return processed.period_tau_motor
+    return np.stack([getattr(motion, kind) for motion in processed.period_motions])
+
+
+def deviations_of(run: dict[str, FloatArray], part: ProcessedRecording, own: bool) -> dict[str, FloatArray]:
+    """Deviations (k, N, n) of a simulation, by signal: from every period, or from the mean of periods of its own."""
+    found = {kind: run[kind] - _of_periods(part, kind) for kind in SIGNALS}
+    return {kind: values.mean(axis=0, keepdims=True) for kind, values in found.items()} if own else found
+
+
+def common_power(deviations: FloatArray) -> FloatArray:
+    """(n,) mean square of what k deviations (k, N, n) with independent noise have in common; may come out negative."""
+    count, samples = deviations.shape[:2]
+    total = np.sum(deviations.sum(axis=0) ** 2, axis=0) - np.sum(deviations**2, axis=(0, 1))
+    return np.asarray(total / (count * (count - 1) * samples), dtype=np.float64)
+
+
+def noise_power(deviations: FloatArray) -> FloatArray:
+    """(n,) mean square of the noise of the mean of k deviations (k, N, n)."""
+    return np.asarray(np.mean(np.var(deviations, axis=0, ddof=1), axis=0) / len(deviations), dtype=np.float64)
+
+
+def spread_of_power(periods: FloatArray) -> FloatArray:
+    """(n,) standard deviation of `common_power` where k periods (k, N, n) have nothing but noise.
+
+    The noise of every period may as well have the opposite sign, independently: that gives the variance.
+    """
+    count, samples = periods.shape[:2]
+    noise = (periods - periods.mean(axis=0)) * np.sqrt(count / (count - 1.0))
+    products = np.einsum("ptj,qtj->jpq", noise, noise) / samples
+    squares = np.sum(products**2, axis=(1, 2)) - np.sum(np.diagonal(products, axis1=1, axis2=2) ** 2, axis=1)
+    return np.asarray(np.sqrt(2.0 * squares) / (count * (count - 1)), dtype=np.float64)
 
 
 def simulated(model: Model, command: Command, processed: ProcessedRecording) -> dict[str, FloatArray]:
@@ -159,12 +263,12 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
             periods=LEAD_PERIODS,
             sensors=SensorNoise.none(),
             jitter=FrictionJitter.none(),
-            controller=command.controller,
+            controller=command.driving(model, processed),
             friction=built.friction,
             plant=built.plant,
             effects=built.effects,
             rate=samples / command.reference.period,
-            start=processed.motion[0:1],
+            start=actual(model, processed)[0][0:1],
         )
     recorded, robot = run.recording, model.robot
     last = slice(-samples, None)
@@ -179,39 +283,45 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
 
 
 def command_of(
-    robot: Robot,
+    model: Model,
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None,
 ) -> Command:
     """What the motors were told to do, from the reference that was recorded where there is one.
 
-    A controller that is only assumed is held against the measured torque.
+    A controller that is only assumed is held against the torque that the motors gave.
+
+    Args:
+        model: what is known of the sensors.
+        recording: what was measured.
+        processed: the same, processed.
+        controller: of the robot; the velocity controller of `simulate` where None.
 
     Raises:
         DiagnosisError: the recording is not periodic.
     """
     if processed.period is None:
         raise DiagnosisError(f"{processed.source} is not periodic: forward simulation cannot be compared with it")
-    frequency, motion = 1.0 / processed.period, processed.motion
+    robot, frequency = model.robot, 1.0 / processed.period
+    motion, tau = actual(model, processed)
     time = np.asarray(np.arange(len(motion)) * (processed.period / len(motion)), dtype=np.float64)
     like = VelocityController() if controller is None else controller
     recorded = recorded_reference(robot, recording, processed)
     harmonics = min(REFERENCE_HARMONICS, (len(motion) - 1) // 2)
     stand_in = FourierSeries.fit(time, motion.theta, frequency, harmonics)
-    own_way = Command(MeasuredDrive(motion, processed.tau_motor, like), stand_in, "")
     gains = " by the gains of the velocity controller of `simulate`" if controller is None else ""
     if recorded is None:
         text = (
             "the recording has no reference: in forward simulation the measured motion and torque of the motors stand "
             f"in for it, held{gains}"
         )
-        return Command(own_way.controller, stand_in, text)
+        return StandIn(like, stand_in, text)
     reference = FourierSeries.fit(time, recorded, frequency, harmonics)
     drive = like.drive(robot, PeriodicReference(reference), time)
     torque = drive.bias - drive.position_gain * motion.theta - drive.velocity_gain * motion.dtheta
-    size = np.sqrt(np.mean(processed.tau_motor**2, axis=0))
-    wrong = np.sqrt(np.mean((torque - processed.tau_motor) ** 2, axis=0)) / np.where(size > 0.0, size, 1.0)
+    size = np.sqrt(np.mean(tau**2, axis=0))
+    wrong = np.sqrt(np.mean((torque - tau) ** 2, axis=0)) / np.where(size > 0.0, size, 1.0)
     worst = int(np.argmax(wrong))
     if wrong[worst] <= REPRODUCED:
         return Command(like, reference, "")
@@ -221,7 +331,7 @@ def command_of(
         f"at {robot.joint_names[worst]!r}: in forward simulation the measured motion and torque of the motors stand in "
         f"for the reference, held{gains}"
     )
-    return Command(own_way.controller, stand_in, text)
+    return StandIn(like, stand_in, text)
 
 
 def recorded_reference(

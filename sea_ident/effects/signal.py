@@ -48,6 +48,10 @@ class SignalEffect(Effect):
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """The signals (N, n) as recorded, from the true ones."""
 
+    def delivered(self, robot: Robot, time: FloatArray, tau_motor: FloatArray) -> FloatArray:
+        """(N, n) torques of the motors as they acted, from those recorded [N m] or [N]; the same by default."""
+        return tau_motor
+
     @property
     def amount_values(self) -> dict[str, float]:
         """Values of its amounts."""

@@ -35,6 +35,13 @@ class TorqueDelay(SignalEffect):
             link[:, i] = ahead(time, rows.link[:, i], self.delay)
         return Contribution(link, motor)
 
+    def delivered(self, robot: Robot, time: FloatArray, tau_motor: FloatArray) -> FloatArray:
+        """The torque when it acted."""
+        i = self.required_index(robot)
+        out = tau_motor.copy()
+        out[:, i] = ahead(time, tau_motor[:, i], -self.delay)
+        return out
+
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """The torque as recorded."""
         i = self.required_index(robot)

@@ -101,11 +101,11 @@ def test_without_a_reference_the_measured_motion_stands_in_and_it_is_said(leg, m
     assert set(found.gaps) == {"q", "theta", "tau"}
 
 
-def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(leg, recordings):
+def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(leg, models, recordings):
     processed = wide_processing(recordings[1], leg, PERIOD)
-    true = command_of(leg, recordings[1], processed, VelocityController())
+    true = command_of(models[1], recordings[1], processed, VelocityController())
     assert true.note == ""
-    other = command_of(leg, recordings[1], processed, VelocityController(bandwidth=20.0, feedforward=0.0))
+    other = command_of(models[1], recordings[1], processed, VelocityController(bandwidth=20.0, feedforward=0.0))
     assert "the given controller gives a torque that is" in other.note
     assert "stand in for the reference" in other.note
 

@@ -1,0 +1,95 @@
+"""The gap in forward simulation, against truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy.data import wide_processing
+from sea_ident.discrepancy.forward import common_power, noise_power, simulation_gap, spread_of_power
+from sea_ident.effects import base_effects, make_effect
+from sea_ident.estimation import identify
+from sea_ident.simulation import FrictionJitter, PlantedEffect, SensorNoise, simulate
+
+PERIOD = 5.0
+# without noise there is nothing to compare a residual with, and a model that lacks something says so
+pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return sea_ident.load_robot("exo_leg")
+
+
+@pytest.fixture(scope="module")
+def series(leg):
+    return [
+        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
+        for seed in (0, 1)
+    ]
+
+
+def exact(leg, series, planted, periods=2):
+    return simulate(
+        leg, series, periods=periods, effects=planted, sensors=SensorNoise.none(), jitter=FrictionJitter.none()
+    ).recording
+
+
+def without_reference(recording):
+    columns = {name: values for name, values in recording.columns.items() if "reference" not in name}
+    return type(recording)(recording.time, columns, recording.source)
+
+
+@pytest.mark.parametrize(
+    ("name", "amounts"),
+    [("encoder_offset", {"offset": 0.02}), ("position_delay", {"delay": 0.004}), ("torque_delay", {"delay": -0.012})],
+)
+def test_a_model_with_the_true_error_of_a_sensor_simulates_what_was_recorded(leg, series, name, amounts):
+    effect = make_effect(name, "knee", **amounts)
+    training, other = (exact(leg, each, [PlantedEffect(effect, np.zeros(0))]) for each in series)
+    models = [
+        identify(leg, training, effects=effects, period=PERIOD)
+        for effects in (base_effects(leg), (*base_effects(leg), effect))
+    ]
+    recording = without_reference(other) if name == "torque_delay" else other
+    found = simulation_gap(*models, recording, wide_processing(recording, leg, PERIOD))
+    assert found.gaps["q"].shrink > 0.85
+    assert found.gaps["q"].before["knee"] > 1e-4
+
+
+def noisy(seed, signal, periods=10, samples=200):
+    rng = np.random.default_rng(seed)
+    slow = rng.standard_normal((periods, 8, 1)) * np.array([1.0, 3.0])
+    shape = np.cos(np.outer(np.arange(samples) * 2 * np.pi / samples, np.arange(1, 9)))
+    return signal[:, None] * np.array([1.0, 0.0]) + np.einsum("tk,pkj->ptj", shape, slow)
+
+
+def test_noise_cancels_in_what_periods_have_in_common():
+    signal = np.sin(np.arange(200) * 2 * np.pi / 200)
+    cases = [noisy(seed, signal) for seed in range(400)]
+    powers = np.array([common_power(case) for case in cases])
+    assert abs(powers[:, 0].mean() - 0.5) < 4.0 * powers[:, 0].std() / 20.0
+    assert abs(powers[:, 1].mean()) < 4.0 * powers[:, 1].std() / 20.0
+    spread = np.array([spread_of_power(case)[1] for case in cases])
+    assert np.sqrt(np.mean(spread**2)) == pytest.approx(powers[:, 1].std(), rel=0.15)
+    noise = np.array([noise_power(case)[1] for case in cases])
+    assert noise.mean() == pytest.approx(9.0 * 8 / 2 / 10, rel=0.05)
+
+
+def test_two_deviations_give_their_product():
+    deviations = np.stack([np.full((5, 1), 2.0), np.full((5, 1), 3.0)])
+    assert common_power(deviations) == pytest.approx(6.0)
+    assert noise_power(deviations) == pytest.approx(0.25)
+
+
+def test_what_is_within_the_noise_is_no_gap_and_it_is_said(leg, series):
+    sensors = SensorNoise(link_position=1e-3)
+    recording = simulate(leg, series[0], periods=4, sensors=sensors, jitter=FrictionJitter.none()).recording
+    model = identify(leg, exact(leg, series[0], ()), period=PERIOD)
+    changed = [replace(c, smoothing=0.011) if c.name == "coulomb_friction" else c for c in model.effects]
+    other = replace(model, effects=tuple(changed))
+    found = simulation_gap(other, model, recording, wide_processing(recording, leg, PERIOD))
+    assert set(found.gaps["q"].before.values()) == {0.0}
+    assert found.gaps["q"].summary().count("within the noise") == leg.n
+    assert "nothing can be said" in found.notes[-1]
