@@ -133,7 +133,8 @@ def _doubts(model: Model) -> list[str]:
     found.extend(
         f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g}, "
         f"deflection {s.largest_deflection:.3g} at most): have the encoders of link and motor different zeros "
-        "(unknown_zero, on the command line --unknown-zero), or has one of them the wrong sign?"
+        "(unknown_zero, on the command line --unknown-zero), has one of them the wrong sign, or does the model lack "
+        "friction of the link (effect link_friction)?"
         for s in model.springs
         if s.stiffness < -5.0 * s.stiffness_std
     )

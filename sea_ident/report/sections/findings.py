@@ -17,6 +17,9 @@ NAMED = 8
 WHOLE = 0.995
 """Share of the samples from which on all of them count."""
 
+POOR_SPRING = 0.05
+"""Share of its torque that a spring may leave."""
+
 EXACT = 1e-6
 """A gap below this share of the torque is rounding."""
 
@@ -130,15 +133,17 @@ def _parameters(model: Model) -> list[Finding]:
 
 
 def _springs(model: Model) -> list[Finding]:
-    levels = {Verdict.LINEAR: "good", Verdict.STIFFENING: "good"}
-    return [
-        Finding(
-            levels.get(spring.verdict, "warn"),
-            f"{spring.joint} spring",
-            f"{str(spring.verdict).replace('_', ' ')}: {spring.note}.",
+    found = []
+    for spring in model.springs:
+        unit = model.robot.joints[model.robot.index(spring.joint)].torque_unit
+        share = spring.rms_residual / max(spring.rms_torque, 1e-300)
+        good = spring.verdict in (Verdict.LINEAR, Verdict.STIFFENING) and share < POOR_SPRING and spring.stiffness > 0.0
+        text = (
+            f"{str(spring.verdict).replace('_', ' ')}: {spring.note}; it leaves {spring.rms_residual:.3g} of "
+            f"{spring.rms_torque:.3g} {unit} rms ({100.0 * share:.2g} %)."
         )
-        for spring in model.springs
-    ]
+        found.append(Finding("good" if good else "warn", f"{spring.joint} spring", text))
+    return found
 
 
 def _validations(joints: tuple[Joint, ...], content: Content) -> list[Finding]:

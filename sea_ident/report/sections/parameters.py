@@ -1,5 +1,6 @@
 """Identified parameters beside those of the robot's description."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import Any, ClassVar
@@ -84,7 +85,7 @@ def parameter_rows(model: Model) -> list[Row]:
     rows = []
     for k, name in enumerate(base.names):
         terms = base.combination(k)
-        combination = "" if len(terms) == 1 else " ".join(f"{c:+.4g} {t}" for t, c in terms.items()).removeprefix("+1 ")
+        combination = "" if len(terms) == 1 else _sum(terms)
         rows.append(
             Row(
                 name=name,
@@ -99,6 +100,16 @@ def parameter_rows(model: Model) -> list[Row]:
             )
         )
     return rows
+
+
+def _sum(terms: Mapping[str, float]) -> str:
+    """A weighted sum as one writes it: a + 0.2 b − c."""
+    space, parts = "\N{NO-BREAK SPACE}", []
+    for name, weight in terms.items():
+        sign = "\N{MINUS SIGN}" if weight < 0.0 else "+"
+        size = "" if abs(abs(weight) - 1.0) < 1e-9 else f"{abs(weight):.4g}{space}"
+        parts.append(f"{sign}{space}{size}{name}")
+    return " ".join(parts).removeprefix(f"+{space}")
 
 
 class Parameters(ModelSection):
