@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Anchor, Effect, Shape
 from sea_ident.effects.signal import SignalEffect, with_joint
@@ -11,17 +13,24 @@ from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
+NEWTON_STEPS = 4
+"""Steps to the deflection of the whole; a linear spring needs one."""
+
+LEAST = 0.1
+"""Smallest share of the compliance that lies before the encoder [-]."""
+
 
 @dataclass(frozen=True)
 class LinkFlexibility(SignalEffect):
     """The bodies stand at q - c tau_spring, where q is what the link encoder shows.
 
-    The compliance bends without inertia of its own. The spring then shows what is between motor and bodies.
+    The compliance bends without inertia of its own. The spring of the model is the whole of both compliances, between
+    motor and bodies: its deflection d solves d - c tau_spring(d) = theta - q.
 
     Attributes:
         joint: joint at which it acts.
         compliance: c, behind the encoder [rad/(N m)].
-        stiffness: K1 of the spring up to the encoder, None for that of the description [N m/rad].
+        stiffness: K1 of the whole spring, None for that of the description [N m/rad].
         cubic_stiffness: K3 of it [N m/rad3].
     """
 
@@ -39,7 +48,7 @@ class LinkFlexibility(SignalEffect):
         return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
 
     def anchored(self, anchor: Anchor) -> "LinkFlexibility":
-        """With the spring of the model: it is the whole of both compliances, of which this is the part before q."""
+        """With the spring of the model."""
         if self.stiffness is not None:
             return self
         return replace(
@@ -52,17 +61,23 @@ class LinkFlexibility(SignalEffect):
         """Q of the bodies."""
         i = self.required_index(robot)
         linear, cubic = self._spring(robot)
-        d, dd = motion.deflection[:, i], motion.deflection_rate[:, i]
-        ddd = motion.ddtheta[:, i] - motion.ddq[:, i]
-        slope = linear + 3.0 * cubic * d**2
-        c = self.compliance
+        c, d = self.compliance, motion.deflection[:, i]
+        whole = d
+        for _ in range(NEWTON_STEPS):
+            slope = linear + 3.0 * cubic * whole**2
+            step = (whole - d - c * (linear * whole + cubic * whole**3)) / np.maximum(1.0 - c * slope, LEAST)
+            whole = whole - step
+        slope = linear + 3.0 * cubic * whole**2
+        share = np.maximum(1.0 - c * slope, LEAST)
+        rate = motion.deflection_rate[:, i] / share
+        bend = motion.ddtheta[:, i] - motion.ddq[:, i] + c * 6.0 * cubic * whole * rate**2
         return with_joint(
             robot,
             motion,
             i,
-            motion.q[:, i] - c * (linear * d + cubic * d**3),
-            motion.dq[:, i] - c * slope * dd,
-            motion.ddq[:, i] - c * (slope * ddd + 6.0 * cubic * d * dd**2),
+            motion.theta[:, i] - whole,
+            motion.dtheta[:, i] - rate,
+            motion.ddtheta[:, i] - bend / share,
         )
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
