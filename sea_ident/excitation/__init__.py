@@ -1,5 +1,6 @@
 """Exciting trajectories: the motion that tells most about the parameters, inside every limit at every instant."""
 
+from sea_ident.excitation.board import Progress
 from sea_ident.excitation.criteria import (
     AOptimality,
     ConditionNumber,
@@ -16,7 +17,6 @@ from sea_ident.excitation.joint_trajectory import write_trajectory_bag, write_tr
 from sea_ident.excitation.ramp import Ramp, RampMotion
 from sea_ident.excitation.result import Excitation, read_excitation
 from sea_ident.excitation.springs import PredictedMotors
-from sea_ident.excitation.starts import Progress
 from sea_ident.excitation.trajectory import sample_trajectory, write_trajectory_csv
 
 __all__ = [

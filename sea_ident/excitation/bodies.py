@@ -14,7 +14,8 @@ where a column of J upstream of joint k turns with it: dJ_j/dq_k = J_j x J_k for
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -251,16 +252,14 @@ class _Body:
         acceleration[:3] += weight[:, None]
         return _Body(jacobian, velocity, turning, acceleration, v, a)
 
-    def some(self, stride: int) -> "_Body":
-        """Every so many samples."""
-        return _Body(*(getattr(self, f.name)[..., ::stride] for f in fields(self)))
-
+    @cached_property
     def z(self) -> FloatArray:
         """(12, N) classical acceleration less gravity, angular acceleration, products of angular velocity."""
         total, last = self.velocity[:, -1], self.acceleration[:, -1]
         omega = total[3:]
         return np.concatenate([last[:3] + _cross(omega, total[:3]), last[3:], omega[_ROW] * omega[_COLUMN]])
 
+    @cached_property
     def dz(self) -> FloatArray:
         """(12, 3 m, N) derivative of z by positions, velocities and accelerations of the path."""
         jacobian, turning = self.jacobian, self.turning
@@ -305,7 +304,7 @@ class BodyMotion:
         for index, body in self.bodies.items():
             tensor, rows = chosen.tensors[index], chosen.paths[index] - 1
             r = tensor.shape[1]
-            wrench = (tensor.reshape(6 * r, 12) @ body.z()).reshape(6, 1, r, self.samples)
+            wrench = (tensor.reshape(6 * r, 12) @ body.z).reshape(6, 1, r, self.samples)
             column = body.jacobian[0][:, None] * wrench[0]
             for axis in range(1, 6):
                 column += body.jacobian[axis][:, None] * wrench[axis]
@@ -332,8 +331,8 @@ class BodyMotion:
             for k in range(m):
                 gathered += body.jacobian[:, k, None] * weight[k]
             force = tensor.reshape(6 * r, 12).T @ gathered.reshape(6 * r, self.samples)  # (12, N)
-            by_state = (body.dz() * force[:, None]).sum(axis=0)  # (3 m, N)
-            wrench = (tensor.reshape(6 * r, 12) @ body.z()).reshape(6, r, self.samples)
+            by_state = (body.dz * force[:, None]).sum(axis=0)  # (3 m, N)
+            wrench = (tensor.reshape(6 * r, 12) @ body.z).reshape(6, r, self.samples)
             # rows upstream of joint k turn with it: J_j x J_k . (wrench of row j)
             share = np.stack([(wrench * weight[k]).sum(axis=1) for k in range(m)], axis=1)  # (6, m, N)
             own = _force_cross(body.jacobian, share)
@@ -349,19 +348,19 @@ class BodyMotion:
         joints = chosen.joints
         samples = len(range(0, self.samples, stride))
         slopes = np.zeros((samples, 3 * joints, chosen.count, joints), dtype=dtype)
-        for index, whole in self.bodies.items():
-            body = whole.some(stride)
+        for index, body in self.bodies.items():
+            jacobian = body.jacobian[..., ::stride]
             tensor, rows, take = chosen.tensors[index], chosen.paths[index] - 1, chosen.places[index]
             r, m = tensor.shape[1], len(rows)
-            transposed = np.ascontiguousarray(body.jacobian.transpose(2, 1, 0), dtype=dtype)  # (N, m, 6)
+            transposed = np.ascontiguousarray(jacobian.transpose(2, 1, 0), dtype=dtype)  # (N, m, 6)
             by_z = tensor.transpose(0, 2, 1).reshape(6, 12 * r).astype(dtype)
             levers = (transposed.reshape(-1, 6) @ by_z).reshape(samples, m, 12, r).transpose(0, 2, 3, 1)
-            dz = np.ascontiguousarray(body.dz().transpose(2, 1, 0), dtype=dtype)
+            dz = np.ascontiguousarray(body.dz[..., ::stride].transpose(2, 1, 0), dtype=dtype)
             slope = (dz @ levers.reshape(samples, 12, r * m)).reshape(samples, 3 * m, r, m)
             if m > 1:
                 # (J_j x J_k) . wrench = J_j . (J_k x wrench) for j < k
-                wrench = (tensor.reshape(6 * r, 12) @ body.z()).reshape(6, 1, r, samples)
-                turned = _force_cross(body.jacobian[:, 1:, None], wrench).reshape(6, (m - 1) * r, samples)
+                wrench = (tensor.reshape(6 * r, 12) @ body.z[:, ::stride]).reshape(6, 1, r, samples)
+                turned = _force_cross(jacobian[:, 1:, None], wrench).reshape(6, (m - 1) * r, samples)
                 upstream = np.ascontiguousarray(turned.transpose(2, 1, 0), dtype=dtype) @ np.swapaxes(transposed, 1, 2)
                 before = np.arange(m) < np.arange(1, m)[:, None, None]
                 slope[:, 1:m] += upstream.reshape(samples, m - 1, r, m) * before

@@ -9,6 +9,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect
 from sea_ident.exceptions import ExcitationError, SeaIdentWarning
+from sea_ident.excitation.board import Progress
 from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.defaults import default_limits
 from sea_ident.excitation.design_model import design_model, reduced_effects
@@ -17,7 +18,7 @@ from sea_ident.excitation.problem import Problem
 from sea_ident.excitation.ramp import Ramp
 from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.springs import PredictedMotors
-from sea_ident.excitation.starts import Progress, climb_from_starts
+from sea_ident.excitation.starts import climb_from_starts
 from sea_ident.excitation.states import Sampling
 from sea_ident.robot import Limits, Robot
 

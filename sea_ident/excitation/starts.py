@@ -4,9 +4,8 @@ A move draws the trajectories of some joints half way to random ones and climbs 
 moves raise log det further than as many fresh starts.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from threading import Event, Lock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -15,6 +14,7 @@ from joblib.parallel import get_active_backend
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.barrier import raise_inside
+from sea_ident.excitation.board import Board, Progress
 from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.feasibility import random_start, repair
 from sea_ident.excitation.information import Information
@@ -38,25 +38,6 @@ _SHARE = 0.5
 _PATIENCE = 8.0
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where a design stands, for progress displays.
-
-    Attributes:
-        start: which start reports.
-        starts: how many there are.
-        step: how many steps it has made.
-        value: its criterion; of different meaning in the short climbs, on few samples, and in the long ones.
-        best: best criterion of all starts so far.
-    """
-
-    start: int
-    starts: int
-    step: int
-    value: float
-    best: float
-
-
 @dataclass(frozen=True, eq=False)
 class Found:
     """What the starts led to.
@@ -70,29 +51,6 @@ class Found:
     coefficients: FloatArray
     values: tuple[float, ...]
     interrupted: bool
-
-
-@dataclass(eq=False)
-class _Board:
-    """The latest trajectory of every start, shared by the threads that climb; also where they are told to stop."""
-
-    starts: int
-    progress: Callable[[Progress], None] | None
-    stop: Event = field(default_factory=Event)
-    lock: Lock = field(default_factory=Lock)
-    latest: dict[int, FloatArray] = field(default_factory=dict)
-    steps: dict[int, int] = field(default_factory=dict)
-    values: dict[int, float] = field(default_factory=dict)
-    best: float = -np.inf
-
-    def note(self, start: int, value: float, coefficients: FloatArray) -> bool:
-        with self.lock:
-            self.latest[start] = coefficients
-            self.steps[start] = self.steps.get(start, 0) + 1
-            self.best = max(self.best, value)
-            if self.progress is not None:
-                self.progress(Progress(start, self.starts, self.steps[start], value, self.best))
-        return self.stop.is_set()
 
 
 def climb_from_starts(
@@ -114,39 +72,97 @@ def climb_from_starts(
         progress: called after every step.
 
     Returns:
-        The best trajectory.
+        The best trajectory; by its own criterion it is never below the D-optimal one from the same starts.
     """
-    board = _Board(starts, progress)
-    count = starts + (given is not None)
+    search = _Search(problem, starts, seed, given, jobs, progress)
+    if isinstance(problem.criterion, DOptimality):
+        return search.run()
+    # log det is the smoothest way to where all parameters are seen, whatever is asked for in the end
+    widest = replace(search, problem=replace(problem, criterion=DOptimality())).run()
+    if widest.interrupted:
+        return Found(widest.coefficients, (problem.reported(widest.coefficients),), interrupted=True)
+    return replace(search, first=widest.coefficients).run()
 
-    interrupted = False
-    try:
-        parallel = Parallel(n_jobs=min(jobs, max(count, _TOGETHER)), prefer="threads")
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Starts that are climbed by one criterion.
+
+    Attributes:
+        problem: what to raise, inside what.
+        starts: number of random starts.
+        seed: of the random numbers.
+        given: (n, 2 L + 1) a further start.
+        jobs: at the same time.
+        progress: called after every step.
+        first: (n, 2 L + 1) a trajectory inside all limits that the result must not be below.
+    """
+
+    problem: Problem
+    starts: int
+    seed: int
+    given: FloatArray | None
+    jobs: int
+    progress: Callable[[Progress], None] | None
+    first: FloatArray | None = None
+
+    @property
+    def count(self) -> int:
+        """Of starts, with a given one."""
+        return self.starts + (self.given is not None)
+
+    def run(self) -> Found:
+        """The best trajectory, or the best so far when interrupted."""
+        board = Board(self.starts, self.problem.criterion.name, self.progress)
+        if self.first is not None:
+            board.latest[self.count] = self.first
+        interrupted = False
+        try:
+            self._climb_all(board)
+        except KeyboardInterrupt:
+            board.stop.set()
+            if not board.latest:
+                raise
+            interrupted = True
+        reached = {start: self.problem.reported(point) for start, point in sorted(board.latest.items())}
+        values = {start: value for start, value in (board.values or reached).items() if start < self.count}
+        return Found(self._best_inside(board.latest, reached), tuple(values.values()), interrupted)
+
+    def _climb_all(self, board: Board) -> None:
+        problem, count = self.problem, self.count
+        parallel = Parallel(n_jobs=min(self.jobs, max(count, _TOGETHER)), prefer="threads")
         # whoever chose another backend, such as a cluster, has it: its workers share no memory with this process
         shared = bool(getattr(get_active_backend(prefer="threads")[0], "supports_sharedmem", False))
         if shared:
-            scouted = parallel(delayed(_scout)(problem, board, seed, given, start) for start in range(count))
+            scouted = parallel(delayed(_scout)(problem, board, self.seed, self.given, start) for start in range(count))
         else:
-            far = parallel(delayed(_scout_apart)(problem, starts, seed, given, start) for start in range(count))
+            far = parallel(
+                delayed(_scout_apart)(problem, self.starts, self.seed, self.given, start) for start in range(count)
+            )
             scouted = [value for value, _ in far]
             for start, (value, point) in enumerate(far):
                 board.note(start, value, point)
         order = [int(k) for k in np.argsort(-np.array(scouted), kind="stable")[: max(1, -(-count // 3))]]
+        if self.first is not None:
+            order.append(count)
         board.best = -np.inf
         if shared:
             parallel(delayed(_climb)(problem, board, start) for start in order)
         else:
-            points = parallel(delayed(_climb_apart)(problem, starts, start, board.latest[start]) for start in order)
+            points = parallel(
+                delayed(_climb_apart)(problem, self.starts, start, board.latest[start]) for start in order
+            )
             board.latest.update(zip(order, points, strict=True))
         board.values = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
-        best = max(order, key=lambda start: board.values[start])
         # the two best go on side by side, as the best may be stuck; few moves all go to the best
         ahead = sorted(order, key=lambda start: -board.values[start])[: 2 if count > _TOGETHER else 1]
         judges = {start: _detailed(problem, board.latest[start]) for start in ahead}
         for first in range(0, count, _TOGETHER):
             bases = [ahead[move % len(ahead)] for move in range(first, min(first + _TOGETHER, count))]
             moved = parallel(
-                delayed(_move)(problem, judges[base], board.latest[base], [seed, first + k, 1], board.stop)
+                delayed(_move)(
+                    problem, judges[base], board.latest[base], [self.seed, first + k, 1], board if shared else None
+                )
                 for k, base in enumerate(bases)
             )
             for start in ahead:
@@ -155,27 +171,28 @@ def climb_from_starts(
                 if value > problem.value(judges[start], board.latest[start]):
                     board.note(start, value, point)
         best = max(ahead, key=lambda start: problem.reported(board.latest[start]))
-        information = judges[best]
-        _polish(problem, information, board, best)
-    except KeyboardInterrupt:
-        board.stop.set()
-        if not board.latest:
-            raise
-        interrupted = True
-    reached = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
-    # what it takes to be inside between the grid points too may cost one much and another nothing
-    order = sorted(reached, key=lambda start: -reached[start])
-    chosen = problem.settle(board.latest[order[0]])
-    for start in order[1:]:
-        if reached[start] <= problem.reported(chosen):
-            break
-        settled = problem.settle(board.latest[start])
-        if problem.reported(settled) > problem.reported(chosen):
-            chosen = settled
-    return Found(chosen, tuple((board.values or reached).values()), interrupted)
+        _polish(problem, judges[best], board, best)
+
+    def _best_inside(self, latest: Mapping[int, FloatArray], reached: Mapping[int, float]) -> FloatArray:
+        """The best trajectory of those that were reached, once it is inside at all times.
+
+        What it takes to be inside between the grid points too may cost one much and another nothing.
+        """
+        problem = self.problem
+        order = sorted(reached, key=lambda start: -reached[start])
+        chosen = problem.settle(latest[order[0]])
+        for start in order[1:]:
+            if reached[start] <= problem.reported(chosen):
+                break
+            settled = problem.settle(latest[start])
+            if problem.reported(settled) > problem.reported(chosen):
+                chosen = settled
+        if self.first is not None and problem.reported(self.first) > problem.reported(chosen):
+            return self.first
+        return chosen
 
 
-def _scout(problem: Problem, board: _Board, seed: int, given: FloatArray | None, start: int) -> float:
+def _scout(problem: Problem, board: Board, seed: int, given: FloatArray | None, start: int) -> float:
     """Draw a start and climb a little."""
     generator = np.random.default_rng([seed, start])
     for draw in range(_DRAWS):
@@ -193,21 +210,20 @@ def _scout(problem: Problem, board: _Board, seed: int, given: FloatArray | None,
     else:
         raise ExcitationError(_singular(problem, information, point))
     board.latest[start] = point
-    # log det is the smoothest way to where all parameters are seen, whatever is asked for in the end; but its
-    # optimum need not be near that of another criterion: every other start goes straight for that
+    # the way of log det and that of the criterion itself may lead to different optima
     criterion = problem.criterion if start % 2 else DOptimality()
-    _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, 30.0 * criterion.tolerance)
+    _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, _COARSE * criterion.tolerance)
     return problem.value(information, board.latest[start])
 
 
-def _climb(problem: Problem, board: _Board, start: int) -> None:
+def _climb(problem: Problem, board: Board, start: int) -> None:
     """Climb until little is left to gain."""
     information = _detailed(problem, board.latest[start])
     criterion = problem.criterion
     _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, _COARSE * criterion.tolerance)
 
 
-def _polish(problem: Problem, information: Information, board: _Board, start: int) -> None:
+def _polish(problem: Problem, information: Information, board: Board, start: int) -> None:
     """Climb to the end."""
     criterion = problem.criterion.refined()
     _raise(problem, information, criterion, board, start, _POLISH_STEPS, 1e-5, criterion.tolerance)
@@ -221,7 +237,7 @@ def _detailed(problem: Problem, point: FloatArray) -> Information:
 
 
 def _move(
-    problem: Problem, information: Information, base: FloatArray, seed: list[int], stop: Event
+    problem: Problem, information: Information, base: FloatArray, seed: list[int], board: Board | None
 ) -> tuple[float, FloatArray]:
     """Draw some joints half way to a random trajectory and climb from there.
 
@@ -230,7 +246,7 @@ def _move(
         information: by which it is judged.
         base: (n, 2 L + 1) trajectory, inside.
         seed: of the random numbers.
-        stop: tells to stop.
+        board: tells to stop; None in another process, which does not see it.
 
     Returns:
         Criterion and coefficients.
@@ -246,7 +262,7 @@ def _move(
     def hopeless(value: float, _: FloatArray) -> bool:
         nonlocal last
         gain, last = value - last, value
-        return stop.is_set() or value + _PATIENCE * gain < goal
+        return (board is not None and board.stop.is_set()) or value + _PATIENCE * gain < goal
 
     point = raise_inside(
         information,
@@ -266,13 +282,13 @@ def _scout_apart(
     problem: Problem, starts: int, seed: int, given: FloatArray | None, start: int
 ) -> tuple[float, FloatArray]:
     """The same in another process, which does not see the board of this one."""
-    board = _Board(starts, None)
+    board = Board(starts, problem.criterion.name, None)
     return _scout(problem, board, seed, given, start), board.latest[start]
 
 
 def _climb_apart(problem: Problem, starts: int, start: int, point: FloatArray) -> FloatArray:
     """The same in another process."""
-    board = _Board(starts, None, latest={start: point})
+    board = Board(starts, problem.criterion.name, None, latest={start: point})
     _climb(problem, board, start)
     return board.latest[start]
 
@@ -281,7 +297,7 @@ def _raise(
     problem: Problem,
     information: Information,
     criterion: Criterion,
-    board: _Board,
+    board: Board,
     start: int,
     steps: int,
     barrier: float,
