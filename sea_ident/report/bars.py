@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from sea_ident.report.chart import nice_ticks, tick_text
 
-_HEIGHT, _LEFT, _TOP, _BOTTOM, _BAR = 190, 58, 22, 40, 22
+_HEIGHT, _LEFT, _TOP, _BOTTOM, _BAR = 190, 66, 22, 40, 22
 
 
 def bars(

@@ -93,7 +93,7 @@ class Chart:
 
     def svg(self) -> Markup:
         """The chart."""
-        left, right, top, bottom = 58, 12, 22 if self.title else 8, 34
+        left, right, top, bottom = 66, 12, 22 if self.title else 8, 34
         inner_width, inner_height = self.width - left - right, self.height - top - bottom
         (x0, x1), (y0, y1) = self._windows()
         to_x, to_y = _Scale(x0, x1, GRID), _Scale(y1, y0, GRID)

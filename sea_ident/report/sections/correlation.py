@@ -13,7 +13,7 @@ STRONG = 0.9
 
 
 class Correlation(ModelSection):
-    """Correlation matrix of the base parameters, and the pairs that can hardly be told apart."""
+    """Correlation of the base parameters by the motion (paper, eq. 13), and the pairs that can hardly be told apart."""
 
     key: ClassVar[str] = "correlation"
     title: ClassVar[str] = "Correlation of the parameters"
@@ -21,7 +21,8 @@ class Correlation(ModelSection):
 
     def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """The matrix as a picture, and the strongest pairs."""
-        covariance = model.covariance
+        # that of the spread between a few periods has hardly more directions than there are periods
+        covariance = model.model_covariance
         std = np.sqrt(np.diag(covariance))
         if not np.all(std > 0.0) or not np.all(np.isfinite(covariance)):
             return None

@@ -53,7 +53,8 @@ class Findings(ModelSection):
             (f"{fit.log_det:.1f}", "log det F\N{PRIME}F"),
             (f"{fit.periods} \N{MULTIPLICATION SIGN} {fit.samples}", "periods and samples of each"),
         ]
-        return {"findings": findings, "tiles": tiles}
+        repaired = content.diagnosis is not None and bool(content.diagnosis.missing)
+        return {"findings": findings, "tiles": tiles, "repaired": repaired}
 
 
 def _fit(model: Model) -> list[Finding]:

@@ -15,6 +15,9 @@ NEIGHBOURS = 5
 
 DOTS = 700
 
+FUNCTION = 0.97
+"""Share of an effect that a quantity explains from which on the effect is drawn as a function of it."""
+
 
 class Missing(DiagnosisSection):
     """Per effect its parameters, its share, its curve and what it could be taken for."""
@@ -59,8 +62,12 @@ def curve(effect: MissingEffect, waves: Waveforms) -> Chart | None:
     step = max(1, len(torque) // DOTS)
     order = np.argsort(axis, kind="stable")
     over_time = label.startswith("time")
-    line = Line(axis[order], torque[order], "after", "the effect") if over_time else _smoothed(axis, torque)
     marks: list[Mark] = [Points(axis[::step], left[::step], "before", "residual left to it")]
+    if not over_time and _share_explained(axis, torque) < FUNCTION:
+        # it depends on something else as well: a line would jump from sample to sample
+        marks.append(Points(axis[::step], torque[::step], "after", "the effect"))
+        return Chart(marks, label, f"torque [N m], {waves.equations[e]}", width=900, height=260)
+    line = Line(axis[order], torque[order], "after", "the effect") if over_time else _smoothed(axis, torque)
     names = [name for name, values in waves.explained.items() if values is explained]
     if names and names[0] in waves.bands:
         std = waves.bands[names[0]][:, e]

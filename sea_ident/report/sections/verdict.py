@@ -30,7 +30,7 @@ class VerdictSection(DiagnosisSection):
         """Sentence, tiles and table."""
         level, meaning = MEANING[diagnosis.verdict]
         lack = diagnosis.lack_of_fit
-        tiles = [(str(len(diagnosis.missing)), "effects missing")]
+        tiles = [(str(len(diagnosis.missing)), "effect missing" if len(diagnosis.missing) == 1 else "effects missing")]
         for label, gap in (("the recording", diagnosis.training), ("held-out data", diagnosis.holdout)):
             if gap is not None and any(value > 0.0 for value in gap.before.values()):
                 tiles.append((f"{100 * gap.shrink:.0f} %", f"of the gap closed on {label}"))
