@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
-from sea_ident.discrepancy.linear import off, solve, whiten
+from sea_ident.discrepancy.linear import off, solve
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
@@ -250,14 +250,16 @@ class Bench(Tangents):
         return float(left @ left)
 
     def clean_residual(self, fit: Fit, noise: NoiseFloor) -> ComplexArray:
-        """(H + 1, E) residual of a fit without what the samples that are left out put into it [N m]."""
+        """(H + 1, E) residual of a fit without what the samples that are left out put into it [N m].
+
+        All harmonics and equations count alike, whatever their noise: where something is missing, it would be spread to
+        where there is more noise, and to the samples of other equations that share it.
+        """
         if not self._free.shape[2]:
             return fit.residual
-        whitener = self.whitener(noise)
-        free = whiten(whitener, self._free)
-        norms = np.linalg.norm(free, axis=0)
-        amounts = np.linalg.lstsq(free / norms, whiten(whitener, fit.residual * fit.scale), rcond=1e-8)[0] / norms
-        cleaned: ComplexArray = fit.residual - (self._free @ amounts) / fit.scale
+        free = stacked(self._free)
+        amounts = np.linalg.lstsq(free, stacked(fit.residual), rcond=1e-8)[0]
+        cleaned: ComplexArray = fit.residual - self._free @ amounts
         return cleaned
 
     def whitener(self, noise: NoiseFloor | None) -> ComplexArray:

@@ -78,7 +78,7 @@ def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_
         if not repeats:
             usable = ~_near_reversal(speed[:, i], round(REVERSAL / interval))
             # slow misfit is not a push
-            smooth = smooth - uniform_filter1d(smooth, max(window, round(0.5 / interval)))
+            smooth = smooth - _slow(smooth, usable, max(window, round(0.5 / interval)))
         found.extend(_runs(i, time, own[:, i], smooth, usable))
     return tuple(sorted(found, key=lambda p: p.start))
 
@@ -101,6 +101,17 @@ def pushed(pushes: tuple[Push, ...], time: FloatArray, joint: int, margin: float
         if push.joint == joint:
             out |= (time >= push.start - margin) & (time <= push.stop + margin)
     return out
+
+
+def _slow(values: FloatArray, usable: NDArray[np.bool_], around: int) -> FloatArray:
+    """(N,) running mean of what is usual: without reversals, and in a second round without what stands out of it."""
+    slow, quiet = np.zeros_like(values), usable
+    for _ in range(2):
+        share = uniform_filter1d(quiet.astype(np.float64), around)
+        slow = uniform_filter1d(np.where(quiet, values, 0.0), around) / np.maximum(share, 1.0 / around)
+        away = np.abs(values - slow)
+        quiet = usable & (away < LAST_SHARE * SIGNIFICANT * np.median(away[usable]) / 0.6745)
+    return np.asarray(slow, dtype=np.float64)
 
 
 def _near_reversal(speed: FloatArray, reach: int) -> NDArray[np.bool_]:

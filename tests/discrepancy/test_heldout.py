@@ -1,0 +1,78 @@
+"""Data that were not used: other periods or another motion, on which a real effect holds and a wrong one does not."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.heldout import held_out, other_periods
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle
+
+
+@pytest.fixture(scope="module")
+def ripple(rippled):
+    bench, start, with_it = rippled
+    return bench, Selection(start, with_it, 1, (1e-9,))
+
+
+@pytest.fixture(scope="module")
+def with_ripple(laboratory):
+    return laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], motion=1, seed=8)
+
+
+def test_every_other_period_is_held_out(ripple):
+    bench, selection = ripple
+    found = other_periods(bench, selection)
+    assert not found.other_motion
+    assert "periods 2, 4, 6" in found.source
+    np.testing.assert_array_equal(found.bench.data.period_tau_motor, bench.data.period_tau_motor[1::2])
+    np.testing.assert_allclose(found.bench.data.tau_motor, bench.data.period_tau_motor[1::2].mean(axis=0))
+    # fitted to the other half: parameters are not those of all periods
+    assert found.after.parameters["hip.torque_ripple_sine"] != selection.final.fit.parameters["hip.torque_ripple_sine"]
+    assert found.transfers[0].tested
+    assert found.transfers[0].share == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
+    found, warnings = held_out(*ripple, with_ripple)
+    assert warnings == ()
+    assert found.other_motion
+    (transfer,) = found.transfers
+    assert transfer.tested
+    assert transfer.share == pytest.approx(1.0, abs=0.1)
+    assert transfer.holds
+    # parameters as they were found: nothing is fitted to the held-out data
+    assert found.after.parameters == pytest.approx(ripple[1].final.fit.parameters)
+    hip = [e.joint == "hip" and str(e.kind) == "motor" for e in found.bench.data.equations].index(True)
+    power = [np.sum(np.abs(fit.residual[:, hip]) ** 2) for fit in (found.before, found.after)]
+    assert power[1] < 0.3 * power[0]
+
+
+def test_an_effect_that_is_not_there_does_not_hold(laboratory, ripple):
+    """The other motion was recorded without it: with its parameters as they are, it makes things worse."""
+    (transfer,) = held_out(*ripple, laboratory.record(motion=1, seed=8))[0].transfers
+    assert transfer.share < 0.1 or not transfer.tested
+
+
+def test_an_effect_of_the_opposite_sign_does_not_hold(laboratory, ripple):
+    turned = laboratory.record([("torque_ripple", "hip", [-1.0, -0.5], {"order": 4.0})], motion=1, seed=8)
+    (transfer,) = held_out(*ripple, turned)[0].transfers
+    assert transfer.tested
+    assert transfer.share == pytest.approx(-3.0, abs=0.5)  # 1 - (2 a)^2 / a^2
+    assert not transfer.holds
+
+
+def test_nothing_was_added_and_nothing_is_held_out(nothing_missing):
+    bench, now = nothing_missing
+    assert held_out(bench, Selection(now, now, 0, ()), None) == (None, ())
+
+
+def test_five_periods_are_not_split(laboratory, ripple):
+    bench = laboratory.bench(laboratory.record(periods=5))
+    now = settle(bench, bench.effects)
+    assert other_periods(bench, Selection(now, now, 1, (1e-9,))) is None
+
+
+def test_one_pass_tests_nothing_and_it_is_said(laboratory, ripple):
+    found, warnings = held_out(*ripple, laboratory.record(periods=1, motion=1))
+    assert not found.other_motion
+    assert "less than two periods" in warnings[0]

@@ -1,0 +1,86 @@
+"""Pushes are found to the sample where they are, and none where nothing pushes."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.pushes import find_pushes, pushed, repeated
+
+INTERVAL = 0.01
+SAMPLES = 500
+"""Of one pass."""
+
+PASSES = 10
+TIME = np.arange(PASSES * SAMPLES) * INTERVAL
+PHASE = np.tile(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES, PASSES)
+SPEED = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
+
+
+def misfit():
+    """What the model lacks: friction that comes again in every pass, far larger than the noise."""
+    return np.stack([2.0 * np.sign(SPEED[:, 0]), np.sin(3.0 * PHASE)], axis=1)
+
+
+def residual(seed=0, noise=0.02):
+    return misfit() + noise * np.random.default_rng(seed).standard_normal(misfit().shape)
+
+
+@pytest.mark.parametrize(("joint", "first", "last", "force"), [(0, 1234, 1301, 1.5), (1, 2740, 2755, -3.0)])
+def test_edges_to_the_sample(joint, first, last, force):
+    values = residual()
+    values[first : last + 1, joint] += force
+    (push,) = find_pushes(TIME, values, SPEED, SAMPLES)
+    assert push.joint == joint
+    assert abs(push.start - TIME[first]) <= 1.01 * INTERVAL
+    assert abs(push.stop - TIME[last]) <= 1.01 * INTERVAL
+    assert push.force == pytest.approx(force, abs=0.15)
+    assert push.impulse == pytest.approx(force * (last - first + 1) * INTERVAL, rel=0.05)
+    assert push.z > 10.0
+
+
+def test_two_pushes_at_two_joints_in_the_order_of_time():
+    values = residual()
+    values[3000:3030, 0] += 2.0
+    values[800:860, 1] += 2.0
+    found = find_pushes(TIME, values, SPEED, SAMPLES)
+    assert [p.joint for p in found] == [1, 0]
+
+
+def test_what_comes_again_in_every_pass_is_no_push():
+    for seed in range(5):
+        assert find_pushes(TIME, residual(seed), SPEED, SAMPLES) == ()
+
+
+def test_what_lasts_for_most_of_the_time_is_a_poor_model():
+    values = residual()
+    values[500:2500, 0] += 2.0
+    assert find_pushes(TIME, values, SPEED, SAMPLES) == ()
+
+
+def test_without_passes_the_time_around_reversals_is_left_aside():
+    clean = 0.02 * np.random.default_rng(2).standard_normal(misfit().shape)
+    assert find_pushes(TIME, clean, SPEED) == ()
+    turn = int(1.25 / INTERVAL)  # of the first joint
+    clean[turn - 3 : turn + 3, 0] += 2.0
+    assert find_pushes(TIME, clean, SPEED) == ()
+    clean[turn + 50 : turn + 56, 0] += 2.0
+    (push,) = find_pushes(TIME, clean + 0.1 * TIME[:, None] / TIME[-1], SPEED)
+    assert push.start == pytest.approx(TIME[turn + 50], abs=1.01 * INTERVAL)
+    assert push.stop == pytest.approx(TIME[turn + 55], abs=1.01 * INTERVAL)
+    assert push.force == pytest.approx(2.0, abs=0.1)
+
+
+def test_repeated_is_the_median_at_the_same_phase():
+    values = misfit()[: 4 * SAMPLES + 100]
+    spoiled = values.copy()
+    spoiled[700:720] += 9.0
+    np.testing.assert_allclose(repeated(spoiled, SAMPLES), values, atol=1e-9)
+
+
+def test_pushed_is_the_push_and_its_margin_at_its_joint():
+    values = residual()
+    values[1000:1050, 0] += 2.0
+    found = find_pushes(TIME, values, SPEED, SAMPLES)
+    here = np.flatnonzero(pushed(found, TIME, 0, 0.1))
+    assert abs(here[0] - 990) <= 1
+    assert abs(here[-1] - 1059) <= 1
+    assert not np.any(pushed(found, TIME, 1, 0.1))

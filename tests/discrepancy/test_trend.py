@@ -1,0 +1,132 @@
+"""Trends: seen with their value where they are, not where the start was still settling, and rarely by chance."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.trend import _Direction, _explained, _gain, _omnibus, _scatter_p, _values, compare_periods
+from sea_ident.effects import make_effect
+from sea_ident.recordings import Recording
+
+LEVEL = 0.05
+DRAWS = 1000
+
+
+def compared(bench):
+    now = settle(bench, bench.effects)
+    return compare_periods(bench, now.fit, now.noise)
+
+
+@pytest.fixture(scope="module")
+def opposite(laboratory):
+    """Coulomb friction that falls by 0.6 N m a minute at the hip and rises by 0.8 at the ankle."""
+    planted = [("friction_drift", "hip", [0.0, -0.6], {}), ("friction_drift", "ankle", [0.0, 0.8], {})]
+    return compared(laboratory.bench(laboratory.record(planted, periods=12)))
+
+
+def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
+    assert opposite.p_value < 1e-6
+    assert not opposite.unnamed
+    assert {(t.effect.name, t.effect.joint) for t in opposite.trends} == {
+        ("friction_drift", "hip"),
+        ("friction_drift", "ankle"),
+    }
+
+
+def test_drifts_have_their_values(opposite):
+    """Whichever time constant was taken: the change within the minute that was recorded."""
+    for trend in opposite.trends:
+        true = {"hip": -0.6, "ankle": 0.8}[trend.effect.joint]
+        # change from the first period to the last, by the time constant that was found
+        span = np.diff(trend.effect.change(np.array([2.5, 57.5]), None))[0]
+        change, std = trend.values[1] * span, trend.stds[1] * span
+        assert abs(change - true * 55.0 / 60.0) < 4.0 * std
+        assert std < 0.1
+        # of the viscous friction nothing changed
+        assert abs(trend.values[0]) <= 4.0 * trend.stds[0] + 1e-12
+
+
+def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
+    bench, now = nothing_missing
+    found = compare_periods(bench, now.fit, now.noise)
+    assert found.p_value > 1e-3
+    assert (found.trends, found.unnamed, found.notes) == ((), False, ())
+
+
+def test_a_start_that_still_settles_is_no_trend(laboratory):
+    """The first period is pulled, strongly at first and less and less: said, and not named."""
+    recording = laboratory.record(periods=8)
+    current, since = recording.columns["current_knee"].copy(), recording.time - recording.time[0]
+    current += np.where(since < 5.0, 6.0 * np.exp(-since / 5.0), 0.0)
+    pulled = Recording(recording.time, {**recording.columns, "current_knee": current}, "pulled")
+    found = compared(laboratory.bench(pulled))
+    assert found.trends == ()
+    assert not found.unnamed
+    assert len(found.notes) == 1
+    assert "the first period differs from the 7 later ones" in found.notes[0]
+
+
+def test_three_periods_show_no_trend(laboratory):
+    assert compared(laboratory.bench(laboratory.record(periods=3))).p_value == 1.0
+
+
+# -- synthetic residuals
+
+
+def direction(rng, periods, size, width=2):
+    profile = np.linspace(-1.0, 1.0, periods)
+    columns = rng.standard_normal((size, width)) @ np.array([[1.0, 0.9], [0.0, 0.4]])[:width, :width]
+    basis = np.linalg.qr(columns)[0]
+    return _Direction(make_effect("friction_drift", "hip"), profile, columns, basis, tuple(range(width)), width)
+
+
+def test_size_of_the_test_by_scatter():
+    """Without any trend, but noise that is large and correlated along the columns: 5 % at 5 %."""
+    rng = np.random.default_rng(11)
+    own = direction(rng, 10, 30)
+    mixing = np.array([[30.0, 0.0], [25.0, 4.0]])
+    rejected = 0
+    for _ in range(DRAWS):
+        flat = rng.standard_normal((10, 30)) + rng.standard_normal((10, 2)) @ mixing.T @ own.basis.T
+        rejected += _scatter_p(flat - flat.mean(axis=0), own) < LEVEL
+    assert 0.03 < rejected / DRAWS < 0.07
+
+
+def test_size_of_the_test_of_everything_at_once(nothing_missing):
+    rng = np.random.default_rng(12)
+    middle = np.arange(10.0)
+    rejected = 0
+    for _ in range(DRAWS):
+        flat = rng.standard_normal((10, 400))
+        rejected += _omnibus(flat - flat.mean(axis=0), middle, nothing_missing[1].noise) < LEVEL
+    assert 0.02 < rejected / DRAWS < 0.09
+
+
+def test_power_of_the_test_by_scatter():
+    rng = np.random.default_rng(13)
+    own = direction(rng, 10, 30)
+    trend = np.outer(own.profile, own.columns @ [1.0, 0.0])
+    found = [_scatter_p(rng.standard_normal((10, 30)) + trend, own) for _ in range(50)]
+    assert np.mean(np.array(found) < 1e-3) > 0.9
+
+
+def test_values_and_gain_of_an_exact_trend():
+    rng = np.random.default_rng(14)
+    own = direction(rng, 8, 20)
+    flat = np.outer(own.profile, own.columns @ [2.0, 3.0])
+    np.testing.assert_allclose(_values(flat, own), [2.0, 3.0], rtol=1e-9)
+    assert _gain(flat, own) == pytest.approx(np.sum(flat**2))
+    np.testing.assert_allclose(_explained(flat, [own]), flat, atol=1e-9)
+
+
+def test_one_cause_does_not_change_its_columns_in_opposite_ways():
+    rng = np.random.default_rng(15)
+    own = direction(rng, 8, 20)
+    flat = np.outer(own.profile, own.columns @ [2.0, -3.0])
+    assert _gain(flat, own) == 0.0
+
+
+def test_a_part_of_the_periods_has_a_profile_without_mean():
+    later = direction(np.random.default_rng(16), 8, 20).over(slice(1, None))
+    assert len(later.profile) == 7
+    assert abs(later.profile.sum()) < 1e-12
