@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -119,20 +119,22 @@ def run_demo(
 
     tell(40, f"simulating {periods} periods of the excitation")
     simulation = simulate(robot, excitation, periods=periods, seed=seed)
-    write_recording(simulation.recording, target("recording.csv"))
+    recording = replace(simulation.recording, source="recording.csv")
+    write_recording(recording, target("recording.csv"))
     tell(60, f"simulating {periods} strides of a gait")
     walk = gait()
     walking = simulate(robot, walk, periods=periods, seed=seed + 1, controller=ComputedTorque())
-    write_recording(walking.recording, target("gait.csv"))
+    stride = replace(walking.recording, source="gait.csv")
+    write_recording(stride, target("gait.csv"))
 
     tell(70, "identifying with one variance per joint")
-    processed = process(simulation.recording, robot, period=excitation.period)
+    processed = process(recording, robot, period=excitation.period)
     joint_model = identify(robot, processed, estimator=JointWLS())
     tell(75, "identifying with one variance per sample")
     model = identify(robot, processed, estimator=PerSampleWLS())
     model.save(target("MODEL.json"))
     tell(80, "predicting the gait")
-    walked = process(walking.recording, robot, period=walk.period)
+    walked = process(stride, robot, period=walk.period)
     joint_gait, sample_gait = validate(joint_model, walked), validate(model, walked)
 
     parameters = parameter_table(model)
