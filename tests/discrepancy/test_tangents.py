@@ -153,3 +153,14 @@ def test_moved_counts_factors_and_ranges():
     assert moved(stribeck, speed, 0.5).speed == pytest.approx(0.1 * np.exp(0.5))
     assert moved(stribeck, exponent, 0.2).exponent == pytest.approx(1.0 + 0.2 * (exponent.upper - exponent.lower))
     assert moved(stribeck, speed, 50.0).speed == speed.upper
+
+
+def test_a_shape_outside_its_range_does_not_move(nothing_missing):
+    bench, _ = nothing_missing
+    narrow = make_effect("stribeck_friction", "knee", speed=1e-3)
+    effects, parameters, first = far_off(bench, [narrow])
+    fit = bench.predicted(effects, parameters)
+    pair = next((k, shape) for k, shape in free_shapes(effects) if k >= first and shape.name == "speed")
+    torque, slopes = bench.tangents(tuple(effects), fit.columns, fit.values, [pair])
+    assert not np.any(torque)
+    assert not np.any(slopes)
