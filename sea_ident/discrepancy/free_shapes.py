@@ -33,10 +33,14 @@ def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
 
 
 def moved(effect: Effect, shape: Shape, step: float) -> Effect:
-    """The effect with one shape moved: by a factor exp(step), or by `step` of its range, within its range."""
+    """The effect with one shape moved: by a factor exp(step), or by `step` of its range, within its range.
+
+    A shape that was given outside its range stays where it is on one side.
+    """
     value = float(getattr(effect, shape.name))
     new = value * np.exp(step) if shape.logarithmic else value + step * (shape.upper - shape.lower)
-    return replace(effect, **{shape.name: float(np.clip(new, shape.lower, shape.upper))})  # type: ignore[arg-type]
+    within = float(np.clip(new, min(shape.lower, value), max(shape.upper, value)))
+    return replace(effect, **{shape.name: within})  # type: ignore[arg-type]
 
 
 def distance(low: Effect, high: Effect, shape: Shape) -> float:
