@@ -4,7 +4,6 @@ Meshes are replaced by their convex hulls and cylinders by prisms around them: w
 from the shapes themselves.
 """
 
-import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,13 +15,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 import trimesh
-import yourdfpy
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
-from sea_ident.exceptions import ExcitationError
+from sea_ident.exceptions import ExcitationError, RobotError
 from sea_ident.excitation.chain import Chain, Poses
 from sea_ident.robot import Robot, mesh_locator
+from sea_ident.robot.geometry import read_geometry
 
 _SIDES = 24
 _SAMPLES = 200
@@ -93,18 +92,12 @@ def collision_shapes(robot: Robot) -> tuple[Shape, ...]:
         ExcitationError: there is none, or a mesh is absent or cannot be read.
     """
     try:
-        urdf = yourdfpy.URDF.load(
-            io.BytesIO(robot.urdf.encode()),
-            build_scene_graph=False,
-            load_meshes=False,
-            load_collision_meshes=False,
-            filename_handler=lambda name: name,
-        )
-    except Exception as error:  # yourdfpy raises whatever its parts do
-        raise ExcitationError(f"{robot.source}: its <collision> elements cannot be read: {error}") from None
+        elements = read_geometry(robot.urdf, robot.source)
+    except RobotError as error:
+        raise ExcitationError(str(error)) from None
     locate = mesh_locator(robot.source)
     shapes = []
-    for link in urdf.robot.links:
+    for link in elements.links:
         frame_id = robot.model.getFrameId(link.name, pin.FrameType.BODY)
         if frame_id >= robot.model.nframes:
             continue

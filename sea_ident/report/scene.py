@@ -1,7 +1,6 @@
 """The robot as triangles and poses, for the viewer of the report."""
 
 import base64
-import io
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,10 +10,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import trimesh
-import yourdfpy
 
 from sea_ident._typing import FloatArray, IntArray
+from sea_ident.exceptions import RobotError
 from sea_ident.robot import Robot, mesh_locator
+from sea_ident.robot.geometry import read_geometry
 
 MOST_FACES = 9_000
 """Triangles of a whole robot: enough to recognise it, few enough to draw in a browser and to embed."""
@@ -159,17 +159,14 @@ def _parts(robot: Robot) -> list[Part]:
 
 def _shapes(robot: Robot) -> list[tuple[str, tuple[int, int, int] | None, FloatArray, IntArray]]:
     """Link, colour, vertices in the frame of the link, faces."""
-    urdf = yourdfpy.URDF.load(
-        io.BytesIO(robot.urdf.encode()),
-        build_scene_graph=False,
-        load_meshes=False,
-        load_collision_meshes=False,
-        filename_handler=lambda name: name,
-    )
-    materials = {material.name: material for material in urdf.robot.materials if material is not None}
+    try:
+        elements = read_geometry(robot.urdf, robot.source)
+    except RobotError:  # a picture is not worth an error: sticks do as well
+        return []
+    materials = {material.name: material for material in elements.materials if material is not None}
     locate = mesh_locator(robot.source)
     out = []
-    for link in urdf.robot.links:
+    for link in elements.links:
         for visual in link.visuals:
             mesh = _mesh(visual.geometry, locate)
             if mesh is None:

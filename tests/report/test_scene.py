@@ -8,8 +8,10 @@ import pytest
 import trimesh
 
 from sea_ident import load_robot
+from sea_ident.exceptions import RobotError
 from sea_ident.report.scene import MOST_FACES, MOST_FRAMES, build_scene, simplify
 from sea_ident.robot import robot_from_text
+from sea_ident.robot.geometry import read_geometry
 
 
 def test_the_foot_hangs_where_forward_kinematics_put_it(leg_model):
@@ -101,3 +103,11 @@ def test_frames_of_the_viewer_are_those_of_pinocchio(leg_model):
     for k in range(3):
         np.testing.assert_allclose(scene.poses[0, k, :, :3], data.oMi[k + 1].rotation, atol=1e-12)
         np.testing.assert_allclose(scene.poses[0, k, :, 3], data.oMi[k + 1].translation, atol=1e-12)
+
+
+def test_shapes_that_cannot_be_read_are_sticks(leg_model):
+    damaged = robot_from_text(leg_model.robot.urdf.replace('<box size="', '<box size="thick '), "damaged")
+    with pytest.raises(RobotError, match="damaged: its shapes cannot be read"):
+        read_geometry(damaged.urdf, damaged.source)
+    scene = build_scene(damaged, np.array([0.0, 1.0]), np.zeros((2, 3)), periodic=False)
+    assert [part.body for part in scene.parts] == [0, 1, 2]
