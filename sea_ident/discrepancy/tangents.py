@@ -88,8 +88,6 @@ class Tangents(Columns):
             own = values[starts[position] : starts[position + 1]]
             low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
             state, apart = self.state(effects), distance(low, high, shape)
-            if apart == 0.0:  # outside its range it does not move
-                continue
             parts = [e.evaluate(state) for e in (low, high)]
             change = Contribution(
                 (parts[1].link - parts[0].link) @ own / apart, (parts[1].motor - parts[0].motor) @ own / apart
