@@ -24,6 +24,10 @@ from sea_ident.robot import Limits, Robot
 
 _MOST_SAMPLES = 1_000_000
 """Of a period; the observation matrix has this many rows per joint."""
+_MANY_COEFFICIENTS = 1000
+"""From which on a design takes minutes; 14 joints with 30 harmonics have 854."""
+_GROWTH = 1.25
+"""Of the time of a step with the number of coefficients (three joints, 10 to 249 harmonics)."""
 
 
 def design_excitation(
@@ -83,6 +87,7 @@ def design_excitation(
     if jobs == 0:
         raise ExcitationError("jobs is 0; give at least 1, or -1 for one per core")
     notes: list[str] = []
+    said = _warn_of_size(robot.n, harmonics, harmonics * base_frequency, notes)
     model, bound = design_model(
         robot,
         reduced_effects(robot) if effects is None else tuple(effects),
@@ -109,7 +114,7 @@ def design_excitation(
         )
     if found.interrupted:
         notes.append("interrupted; this is the best so far")
-    for note in notes:
+    for note in notes[said:]:
         python_warnings.warn(note, SeaIdentWarning, stacklevel=2)
     ramps = (None, None) if ramp is None else problem.ramps(found.coefficients, ramp)
     seconds = time.perf_counter() - begin
@@ -127,6 +132,20 @@ def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> Float
     if outside:
         notes.append(f"the given start is outside the limits; it was moved inside: {', '.join(outside)}")
     return coefficients
+
+
+def _warn_of_size(n: int, harmonics: int, highest: float, notes: list[str]) -> int:
+    """Say before the work begins that it will be long; the number of notes that were said."""
+    coefficients = n * (2 * harmonics + 1)
+    if coefficients < _MANY_COEFFICIENTS:
+        return 0
+    longer = (coefficients / (21.0 * n)) ** _GROWTH
+    notes.append(
+        f"{harmonics} harmonics of {n} joints are {coefficients} coefficients, up to {highest:.3g} Hz: a step takes "
+        f"about {longer:.0f} times as long as with 10 harmonics. Take fewer, or interrupt to have the best so far"
+    )
+    python_warnings.warn(notes[-1], SeaIdentWarning, stacklevel=3)
+    return len(notes)
 
 
 def _check_whole(name: str, number: object, least: float) -> None:

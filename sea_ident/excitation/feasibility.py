@@ -17,6 +17,8 @@ from sea_ident.excitation.quadratic import solve_quadratic
 from sea_ident.motion import FourierSeries
 
 _CUT_ROUNDS = 3
+# harmonics that a random start has at most, and with which a trajectory is repaired by a QP
+_DRAWN = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +135,14 @@ def random_start(
         (n, 2 L + 1) coefficients.
     """
     harmonics = (centre.shape[1] - 1) // 2
+    if harmonics > _DRAWN:
+        # the faster ones are left to the ascent
+        slow = np.concatenate([centre[:, :_DRAWN], centre[:, harmonics : harmonics + _DRAWN], centre[:, -1:]], axis=1)
+        slow = random_start(limits, base_frequency, slow, generator)
+        start = np.zeros(centre.shape)
+        start[:, :_DRAWN], start[:, harmonics : harmonics + _DRAWN] = slow[:, :_DRAWN], slow[:, _DRAWN:-1]
+        start[:, -1] = slow[:, -1]
+        return start
     omega = 2.0 * np.pi * base_frequency * np.arange(1, harmonics + 1)
     reach = limits.joint_width()
     wish = generator.normal(size=centre.shape)
@@ -143,6 +153,8 @@ def random_start(
 
 def repair(limits: LinearLimits, base_frequency: float, centre: FloatArray, wish: FloatArray) -> FloatArray:
     """The trajectory inside all linear limits that is nearest to a wish, by one QP (with cuts at its extrema).
+
+    With many harmonics the QP would take minutes; the wish is then shrunk toward rest.
 
     Args:
         limits: the limits.
@@ -162,8 +174,10 @@ def repair(limits: LinearLimits, base_frequency: float, centre: FloatArray, wish
     # near in velocity, with the mean position counted like the slowest harmonic
     weight = np.ones(centre.shape)
     weight[:, -1] = (2.0 * np.pi * base_frequency) ** 2
-    found = wish
-    for _ in range(_CUT_ROUNDS):
+    found, factor = wish, 1.0
+    if harmonics > _DRAWN:
+        factor = shrink(limits, FourierSeries.from_coefficients(wish, base_frequency), centre[:, -1])
+    for _ in range(_CUT_ROUNDS if harmonics <= _DRAWN else 0):
         rows = limits.rows((base_frequency, harmonics), which, time)
         present = rows @ centre.ravel()
         step, _ = solve_quadratic(

@@ -17,6 +17,10 @@ from sea_ident.motion import FourierSeries, fourier_basis
 from sea_ident.robot import Limits, Robot
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
+
+# harmonics from which on roots are isolated by bisection, and how often at most
+_COMPANION = 40
+_BISECTIONS = 24
 _KINDS = ("position", "velocity", "acceleration", "jerk")
 
 
@@ -102,9 +106,9 @@ def stationary_points(
     """All extrema of trigonometric polynomials.
 
     The slope sum_l A_l cos l phi + B_l sin l phi, times z^L with z = exp(i phi), is a polynomial of degree 2 L in z:
-    the real extrema are its roots on the unit circle, eigenvalues of its companion matrix. Each is polished by Newton's
-    method and a grid of 8 points per harmonic is added, so that a root lost to rounding (a double one) costs nothing
-    that could be seen.
+    the real extrema are its roots on the unit circle, eigenvalues of its companion matrix. As their cost grows with
+    L^3, the roots of many harmonics are isolated by bisection instead. Each is polished by Newton's method and a grid
+    of 8 points per harmonic is added, so that a root lost to rounding (a double one) costs nothing that could be seen.
 
     Args:
         series: m polynomials as the joints of a series.
@@ -129,7 +133,10 @@ def stationary_points(
     candidates = [(which[(peak | valley).ravel()], phase[(peak | valley).ravel()])]
     size = np.abs(slope).max(axis=1)
     solvable = np.flatnonzero(size > 0.0)
-    if len(solvable):
+    if harmonics > _COMPANION:
+        index, angle = _isolated_roots(slope[solvable])
+        candidates.append((solvable[index], angle))
+    elif len(solvable):
         polynomial = np.concatenate(
             [slope[solvable][:, ::-1].conj(), np.zeros((len(solvable), 1)), slope[solvable]], axis=1
         )
@@ -151,6 +158,34 @@ def stationary_points(
     np.maximum.at(high, which, level)
     time = np.mod(phase, 2.0 * np.pi) / omega
     return low + offset, high + offset, which, time
+
+
+def _isolated_roots(slope: ComplexArray) -> tuple[IntArray, FloatArray]:
+    """Roots of (m, L) trigonometric polynomials ``Re sum_l slope_l exp(i l phi)``: index and angle of each.
+
+    An arc is given up where the polynomial is proven to have no root in it, and kept where its derivative is proven to
+    have none, so that there is one root at most; any other is cut in two.
+    """
+    m, harmonics = slope.shape
+    order = np.arange(1, harmonics + 1)
+    bend = (np.abs(slope) * order**2).sum(axis=1)  # of the second derivative, at most
+    half = np.pi / (8 * harmonics)
+    index = np.repeat(np.arange(m), 8 * harmonics)
+    angle = np.tile((2.0 * np.arange(8 * harmonics) + 1.0) * half, m)
+    found: list[tuple[IntArray, FloatArray]] = []
+    for _ in range(_BISECTIONS):
+        wave = slope[index] * np.exp(1j * angle[:, None] * order)
+        level, tilt = wave.sum(axis=1).real, -(order * wave.imag).sum(axis=1)
+        change = half * bend[index]
+        possible = np.abs(level) <= half * (np.abs(tilt) + 0.5 * change)
+        single = possible & (np.abs(tilt) > change)
+        found.append((index[single], angle[single]))
+        left = possible & ~single
+        half *= 0.5
+        index = np.repeat(index[left], 2)
+        angle = (angle[left][:, None] + half * np.array([-1.0, 1.0])).ravel()
+    found.append((index, angle))
+    return np.concatenate([part[0] for part in found]), np.concatenate([part[1] for part in found])
 
 
 def _unit_roots(polynomial: ComplexArray) -> tuple[IntArray, FloatArray]:

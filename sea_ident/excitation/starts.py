@@ -157,8 +157,9 @@ class _Search:
         # the two best go on side by side, as the best may be stuck; few moves all go to the best
         ahead = sorted(order, key=lambda start: -board.values[start])[: 2 if count > _TOGETHER else 1]
         judges = {start: _detailed(problem, board.latest[start]) for start in ahead}
-        for first in range(0, count, _TOGETHER):
-            bases = [ahead[move % len(ahead)] for move in range(first, min(first + _TOGETHER, count))]
+        moves = count + (_TOGETHER if count > _TOGETHER else 0)
+        for first in range(0, moves, _TOGETHER):
+            bases = [ahead[move % len(ahead)] for move in range(first, min(first + _TOGETHER, moves))]
             moved = parallel(
                 delayed(_move)(
                     problem, judges[base], board.latest[base], [self.seed, first + k, 1], board if shared else None

@@ -410,3 +410,23 @@ def test_interruption_returns_the_best_so_far(exo):
     assert len(found.start_values) < 6
     assert violations(exo, found.series, 20_000) <= 1e-9
     assert found.log_det > 0.0
+
+
+def test_very_many_harmonics_are_begun_at_once_and_can_be_interrupted(exo):
+    """1023 coefficients: said before the first step, the first step comes soon, and what is there then is inside."""
+    values = []
+
+    def interrupt(state):
+        values.append(state.value)
+        if len(values) == 3:
+            raise KeyboardInterrupt
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = design_excitation(exo, harmonics=170, starts=2, rate=50.0, jobs=1, progress=interrupt)
+    texts = [str(warning.message) for warning in caught]
+    assert len(texts) == len(set(texts)) == len(found.warnings) == 2
+    assert "170 harmonics of 3 joints are 1023 coefficients, up to 17 Hz" in texts[0]
+    assert values == sorted(values)
+    assert all(margin >= 0.0 for margin in found.margins.values())
+    assert violations(exo, found.series, 20_000) <= 1e-9

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import sea_ident.excitation.linear_limits as linear_limits_module
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.linear_limits import linear_limits, stationary_points
 from sea_ident.motion import FourierSeries, fourier_basis
@@ -47,6 +48,29 @@ def test_extremes_where_harmonics_vanish(coefficients):
     low, high, _, _ = stationary_points(series, np.array([1]))
     assert high[0] == pytest.approx(max(coefficients), abs=1e-12)
     assert low[0] == pytest.approx(-max(coefficients), abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["random", "nearly smooth", "one wave", "still"])
+@pytest.mark.parametrize("harmonics", [3, 12, 45])
+def test_isolated_roots_are_those_of_the_companion_matrix(monkeypatch, harmonics, kind):
+    """Two independent ways to the extrema, for any number of harmonics."""
+    series = random_series(6, harmonics, seed=harmonics)
+    gain = {"random": 1.0, "nearly smooth": 1e-9, "one wave": 0.0, "still": 0.0}[kind]
+    a, b = series.a.copy(), series.b.copy()
+    a[:, harmonics // 2 :] *= gain
+    b[:, 1:] *= gain
+    a[:, 0] *= kind != "still"
+    a[:, 1:] *= kind != "one wave" and kind != "still"
+    b[:, 0] *= kind != "one wave" and kind != "still"
+    series = FourierSeries(0.1, series.offset, a, b)
+    derivative = np.array([0, 1, 2, 3, 0, 2])
+    found = []
+    for companion in (harmonics, harmonics - 1):
+        monkeypatch.setattr(linear_limits_module, "_COMPANION", companion)
+        low, high, _, _ = stationary_points(series, derivative)
+        found.append((low, high))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12 * np.ptp(found[0], axis=0).max() + 1e-15)
 
 
 def test_flat_extremum():
