@@ -64,6 +64,16 @@ LITTLE_LEFT = 0.02
 RIGHT = 1.2
 """Statistic over degrees of freedom up to which no other effect is tried in the place of one that was added."""
 
+HOPELESS = 100.0
+"""Statistic over degrees of freedom beyond which no further effect is looked for, ..."""
+
+SLOW = 0.4
+"""... where the second or a later one left more than this share of the excess: the library does not have it."""
+
+LEAST_OF_A_SIGNAL = 0.02
+"""Share of what it is to explain that a first step must promise of an effect in the chain of signals: it says little of
+one that is not small, but not nothing."""
+
 CHALLENGERS = 3
 """Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
 
@@ -128,6 +138,9 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
             if now.fit.statistic / now.fit.dof > 0.98 * before:
                 break
         now = _exchange(bench, now, len(added))
+        lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
+        if lost and now.fit.excess > SLOW * last.fit.excess:
+            break
         if not all(physical(bench, now.fit, -k) for k in range(1, len(added) + 1)):
             added.pop()
             now = last
@@ -237,7 +250,8 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
         best = fit
         rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
-            if candidate.gain < 0.5 * (reduced.statistic - fit.statistic) and not is_signal(candidate.effect):
+            promised = LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5
+            if candidate.gain < promised * (reduced.statistic - fit.statistic):
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             better = best.statistic + penalty(best.effects[position], bench)
