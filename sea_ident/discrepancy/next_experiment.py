@@ -218,9 +218,13 @@ def _identified(model: Model) -> tuple[Robot, PredictedMotors | None]:
     if not model.springs:
         return robot, None
     laws = {spring.joint: spring.law for spring in model.springs}
-    return robot, PredictedMotors(
-        {j: law[0] for j, law in laws.items()}, {j: max(law[1], 0.0) for j, law in laws.items()}
-    )
+    # a joint that was not moved enough may come out with a stiffness below zero, which predicts no deflection
+    told = {j: law for j, law in laws.items() if law[0] > 0.0}
+    known = {j: robot.spring(j).stiffness for j in laws if j not in told}
+    if any(stiffness is None or stiffness <= 0.0 for stiffness in known.values()):
+        return robot, None
+    stiffness = {j: law[0] for j, law in told.items()} | {j: float(s) for j, s in known.items() if s is not None}
+    return robot, PredictedMotors(stiffness, {j: max(law[1], 0.0) for j, law in told.items()})
 
 
 def _data_of(data: PeriodData, robot: Robot, series: FourierSeries, motors: PredictedMotors | None) -> PeriodData:

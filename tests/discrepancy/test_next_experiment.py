@@ -1,12 +1,14 @@
 """Excite, record, diagnose: what a first, small motion leaves open, the motion that it proposes settles."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.next_experiment import _identified
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
@@ -40,3 +42,18 @@ def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(name, values, shape
     assert verdicts[0] is Verdict.AMBIGUOUS
     assert verdicts[-1] in (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER)
     assert [(m.effect, m.joint) for m in found.missing] == [(name, "knee")]
+
+
+def test_a_stiffness_below_zero_predicts_no_deflection():
+    leg = sea_ident.load_robot("exo_leg")
+    series = sea_ident.design_excitation(leg, base_frequency=0.2, harmonics=5, starts=1, seed=0).series
+    recording = simulate(leg, series, periods=4, seed=1).recording
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = sea_ident.identify(leg, recording, period=5.0)
+    bad = tuple(replace(spring, stiffness=-5.0) if spring.joint == "knee" else spring for spring in model.springs)
+    motors = _identified(replace(model, springs=bad))[1]
+    # what the annotation says stands in for it
+    assert motors.stiffness["knee"] == leg.spring("knee").stiffness
+    assert motors.stiffness["hip"] == pytest.approx(model.springs[0].stiffness)
+    assert "knee" not in motors.cubic_stiffness
