@@ -1,0 +1,92 @@
+"""Verdicts from whole recordings: what does not transfer, and what no library has.
+
+The effect that the library lacks is planted from here and never registered.
+"""
+
+import warnings
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy import Verdict
+from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
+from sea_ident.exceptions import SeaIdentWarning
+
+PERIOD = 5.0
+RIPPLE = ("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})
+
+
+@dataclass(frozen=True)
+class CrossedFriction(Effect):
+    """Friction of one motor that changes with the position of two joints: nothing in the library has both."""
+
+    order: float = 3.0
+
+    name: ClassVar[str] = "crossed_friction"
+    side: ClassVar[Side] = Side.MOTOR
+    source: ClassVar[str] = "none"
+
+    def columns(self, robot):
+        return (Column(self.parameter_name(), "N m", self.name, self.joint, self.side),)
+
+    def form(self, theta, dtheta, i, k):
+        turning = np.tanh(dtheta[..., i] / 0.5)
+        return turning * np.sin(self.order * theta[..., k]) * np.cos(2.0 * self.order * theta[..., i])
+
+    def indices(self, robot):
+        i = robot.index(self.joint)
+        return i, (i + 1) % robot.n
+
+    def evaluate(self, state):
+        i, k = self.indices(state.robot)
+        motor = np.zeros((len(state.motion), state.robot.n, 1))
+        motor[:, i, 0] = self.form(state.motion.theta, state.motion.dtheta, i, k)
+        return Contribution(np.zeros_like(motor), motor)
+
+    def torque(self, robot, values):
+        i, k = self.indices(robot)
+
+        def act(state, link, motor):
+            motor[i] += float(values[0] * self.form(np.asarray(state.theta), np.asarray(state.dtheta), i, k))
+
+        return act
+
+
+def diagnosed(laboratory, recording, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
+        return sea_ident.diagnose(model, recording, **options)
+
+
+def names(found):
+    return [(m.effect, m.joint) for m in found.missing]
+
+
+def test_the_planted_effect_is_in_no_library():
+    assert CrossedFriction.name not in effect_classes()
+
+
+@pytest.mark.slow
+def test_what_does_not_hold_on_another_motion_is_suspect(laboratory):
+    """A disturbance that looks like a ripple is there on one day, and has turned round on another."""
+    training = laboratory.record([RIPPLE], periods=12)
+    turned = ("torque_ripple", "hip", [-1.0, -0.5], {"order": 4.0})
+    found = diagnosed(laboratory, training, holdout=laboratory.record([turned], motion=1, periods=12, seed=9))
+    assert found.verdict is Verdict.SUSPECT
+    assert names(found) == [("torque_ripple", "hip")]
+    assert found.missing[0].transfer < 0.0
+    assert found.holdout.shrink < 0.0
+
+
+@pytest.mark.slow
+def test_an_effect_that_no_library_has_gets_no_name_of_its_own(laboratory):
+    strange = (CrossedFriction("knee"), [2.0])
+    found = diagnosed(laboratory, laboratory.record([strange], periods=12))
+    assert found.verdict is Verdict.NOT_IN_LIBRARY
+    assert found.lack_of_fit.p_value < 1e-6
+    assert found.locations[0].joint == "knee"
+    assert found.lack_of_fit.remainder > 3e-3
