@@ -54,10 +54,11 @@ def design_excitation(
     Args:
         robot: the robot.
         base_frequency: of the Fourier series [Hz]; its inverse is the period.
-        harmonics: L per joint.
+        harmonics: L per joint; below half of `rate`. Hundreds take minutes, which is said before the work begins.
         starts: random starts; the most promising third is climbed to the end and the best result returned.
         seed: of the random starts.
-        criterion: what to raise; log det by default.
+        criterion: what to raise; log det by default. Any other begins with the design for log det from the same starts
+            and is never below it.
         effects: the model whose parameters are to be told; `reduced_effects` by default.
         limits: limits of the motion; those of the robot by default.
         motors: how motor positions follow from those of the links; theta = q by default. With `PredictedMotors` the

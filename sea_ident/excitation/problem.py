@@ -22,8 +22,9 @@ from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.space_limits import SpaceLimits, space_limits
 from sea_ident.excitation.space_proof import TOLERANCE, proven_rooms
 from sea_ident.excitation.space_wall import SpaceWall
+from sea_ident.excitation.spectral_wall import linear_wall
 from sea_ident.excitation.states import Sampling
-from sea_ident.excitation.walls import DynamicWall, LinearWall, Wall
+from sea_ident.excitation.walls import DynamicWall, Wall
 from sea_ident.motion import FourierSeries
 from sea_ident.robot import Limits, Robot
 
@@ -104,7 +105,7 @@ class Problem:
         position = comfortable_position(
             linear, nonlinear, harmonics, _describer(dynamic, space), np.random.default_rng([seed, 2**31])
         )
-        wall = LinearWall.of(linear, frequency, harmonics, _LINEAR_POINTS * harmonics)
+        wall = linear_wall(linear, frequency, harmonics, _LINEAR_POINTS * harmonics)
         centre = at_rest(position, harmonics)
         return Problem(robot, model, criterion, fine, linear, dynamic, space, (wall, *nonlinear), centre)
 

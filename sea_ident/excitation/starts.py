@@ -2,6 +2,9 @@
 
 A move draws the trajectories of some joints half way to random ones and climbs again. Good optima lie near good ones:
 moves raise log det further than as many fresh starts.
+
+Log det is concave in the information and smooth, other criteria have more optima of their own: for them all this is
+done twice, and what was found by log det is one more start that is climbed to the end.
 """
 
 from collections.abc import Callable, Mapping

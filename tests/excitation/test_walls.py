@@ -1,15 +1,17 @@
-"""Linear limits by Fourier transforms: the same as by the basis functions themselves."""
+"""Linear limits on a grid: values, gradients and curvature are those of the basis functions."""
 
 import numpy as np
 import pytest
 
 from sea_ident.excitation.linear_limits import LinearLimits
+from sea_ident.excitation.spectral_wall import SpectralWall
 from sea_ident.excitation.walls import LinearWall
 from sea_ident.motion import fourier_basis
 
 
 @pytest.mark.parametrize("harmonics", [1, 2, 7, 40])
-def test_linear_wall_is_that_of_the_basis_functions(harmonics):
+@pytest.mark.parametrize("kind", [LinearWall, SpectralWall])
+def test_linear_walls_are_those_of_the_basis_functions(kind, harmonics):
     rng = np.random.default_rng(harmonics)
     n, points, frequency = 3, 32 * harmonics, 0.2
     derivative = np.array([0, 1, 2, 3, 0, 1, 2], dtype=np.intp)
@@ -17,7 +19,7 @@ def test_linear_wall_is_that_of_the_basis_functions(harmonics):
     joints = rng.normal(size=(m, n))
     names = tuple(str(k) for k in range(m))
     limits = LinearLimits(names, joints, derivative, -np.ones(m), np.ones(m), names)
-    wall = LinearWall.of(limits, frequency, harmonics, points)
+    wall = kind.of(limits, frequency, harmonics, points)
     time = np.arange(points) / (points * frequency)
     # (m, M, v): values of every limit by every coefficient
     rows = np.array(
