@@ -176,8 +176,8 @@ for label, effects in candidates.items():
     print(f"{label:<8}" + "".join(f"{cell:>24}" for cell in cells) + f"{error:>16.2e} N m")
 
 # %% [markdown]
-# Then as it would be measured. With enough periods the planar model's inertia of the small rotors is off by many of the
-# standard deviations that it claims, and it predicts the torque of another trajectory worse.
+# Then as it would be measured. The planar model's rotor inertias are off by two to three of the standard deviations that
+# it claims, by more with more periods, and it predicts the torque of another trajectory worse.
 
 # %%
 models, errors = {}, {}
@@ -208,6 +208,6 @@ for k, (label, error) in enumerate(errors.items()):
 axes.axhline(1.0, color="black", linewidth=0.8)
 axes.set_xticks(place + 0.175, tilted.joint_names)
 axes.set_ylabel("torque error / noise")
-axes.legend()
+axes.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 figure.tight_layout()
 figure.savefig("planar_to_3d.png", dpi=120)

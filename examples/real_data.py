@@ -155,10 +155,9 @@ if path:
 #   as a tilt of the base (0.2 degrees would do). The data cannot choose, so the software says so instead of choosing.
 # - Beyond the published model something is still missing: the scatter between the three periods is some 0.1 N, and the
 #   model leaves more than ten times as much. A published reference model is not a perfect one. But the second round
-#   finds nothing that deserves to be added. What comes nearest is friction that is not constant over speed, a few
-#   newtons on part of the way back, and a delay of less than one sample between force and position; the first and the
-#   last have a rival that does as well, and together they still leave 2 % of the force without a name. So nothing is
-#   added, and the history stops here.
+#   finds nothing that deserves to be added. What comes nearest is a few newtons on part of the way and a delay of less
+#   than one sample between force and position; together they still leave 2 % of the force without an explanation, so
+#   they are given as the nearest and not as names. Nothing is added, and the history stops here.
 # - Three periods are few. Each verdict says so.
 #
 # ### Who pushed the carriage?
