@@ -88,4 +88,6 @@ def with_link_equations(model: Model, processed: ProcessedRecording, fit: Fit) -
         repeatability=covariance,
         influences=model.uncertainty.influences @ left.T,
     )
-    return with_values(replace(model, uncertainty=uncertainty), processed, values)
+    information = model.information.copy()
+    information[np.ix_(told, told)] += np.linalg.inv(other)
+    return with_values(replace(model, uncertainty=uncertainty, information=information), processed, values)

@@ -1,0 +1,120 @@
+"""A repaired model is a model like any other: saved, read, simulated, exported, diagnosed again; one of every kind."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.settle import settle
+from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.estimation import identify, physical_parameters, read_model
+from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.processing import process
+from sea_ident.simulation import (
+    FrictionJitter,
+    PlantedEffect,
+    SensorNoise,
+    plant_from_identified,
+    plant_from_robot,
+    simulate,
+)
+
+PERIOD = 5.0
+
+
+def planted(name, joint, values, **shape):
+    return PlantedEffect(make_effect(name, joint, **shape), np.array(values, dtype=float))
+
+
+KINDS = {
+    "column": (planted("torque_ripple", "hip", [1.0, 0.5], order=4.0), 2e-4),
+    "shape": (planted("stribeck_friction", "knee", [0.8], speed=0.15, exponent=1.5), 2e-4),
+    "memory": (planted("spring_hysteresis", "knee", [0.8, 0.8], slip=0.005), 3e-4),
+    "signal": (planted("encoder_offset", "knee", [], offset=0.02), 2e-4),
+    "spring": (planted("asymmetric_spring", "knee", [15.0], exponent=1.0), 3e-4),
+    "link": (planted("link_friction", "knee", [0.1, 0.15]), 3e-4),
+}
+QUICK = ("signal",)
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return sea_ident.load_robot("exo_leg")
+
+
+@pytest.fixture(scope="module")
+def series(leg):
+    return [
+        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
+        for seed in (0, 1)
+    ]
+
+
+def diagnosed(model, recording):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return sea_ident.diagnose(model, recording)
+
+
+def identified(leg, recording, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return identify(leg, recording, period=PERIOD, **options)
+
+
+@pytest.mark.parametrize("kind", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in KINDS])
+def test_a_repaired_model_is_a_model_like_any_other(leg, series, tmp_path, kind):
+    effect, close = KINDS[kind]
+    recording = simulate(leg, series[0], periods=12, seed=70, effects=[effect]).recording
+    found = diagnosed(identified(leg, recording), recording)
+    assert (effect.effect.name, "knee" if kind != "column" else "hip") in [(m.effect, m.joint) for m in found.missing]
+    found.model.save(tmp_path / "repaired.json")
+    again = read_model(tmp_path / "repaired.json")
+    assert diagnosed(again, recording).verdict == "none"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        sea_ident.export_urdf(again, tmp_path / "repaired.urdf")
+    annotated = sea_ident.load_robot(tmp_path / "repaired.urdf")
+    assert annotated.joint_names == leg.joint_names
+    built = plant_from_identified(again)
+    quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none(), "periods": 1}
+    truth = simulate(leg, series[1], effects=[effect], **quiet)
+    run = simulate(leg, series[1], plant=built.plant, friction=built.friction, effects=built.effects, **quiet)
+    assert np.sqrt(np.mean((run.motion.q - truth.motion.q) ** 2, axis=0)).max() < close
+
+
+@pytest.mark.slow
+def test_what_drifts_is_named_and_is_no_part_of_the_model(leg, series):
+    drift = planted("friction_drift", "knee", [0.3, 0.5], time_constant=60.0)
+    recording = simulate(leg, series[0], periods=12, seed=70, effects=[drift]).recording
+    found = diagnosed(identified(leg, recording), recording)
+    assert ("friction_drift", "knee") in [(m.effect, m.joint) for m in found.missing]
+    assert "friction_drift" not in [effect.name for effect in found.model.effects]
+
+
+def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(leg, series):
+    effect, _ = KINDS["link"]
+    recording = simulate(leg, series[0], periods=12, seed=70, effects=[effect]).recording
+    effects = (*base_effects(leg), effect.effect)
+    from_sum = identified(leg, recording, effects=effects)
+    bench = Bench(period_data(wide_processing(recording, leg, PERIOD), leg), (*effects, *spring_effects(leg)))
+    repaired = repaired_model(from_sum, process(recording, leg, period=PERIOD), settle(bench, bench.effects).fit)
+    both = {p.name: p for p in repaired.parameters}
+    alone = {p.name: p for p in from_sum.parameters}
+    for name, value in zip(("knee.link_friction_viscous", "knee.link_friction_coulomb"), effect.values, strict=True):
+        assert abs(both[name].value - value) < 5.0 * both[name].std
+        assert both[name].std < 0.05 * alone[name].std
+    coulomb = both["knee.coulomb_friction"]
+    assert coulomb.value == pytest.approx(plant_from_robot(leg).coulomb_friction[1], rel=0.05)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        physical = physical_parameters(repaired)
+    assert np.abs(physical.shift_in_std).max() < 1.0
+    springs = {spring.joint: spring for spring in repaired.springs}
+    truth = plant_from_robot(leg)
+    for i, name in enumerate(leg.joint_names):
+        assert springs[name].stiffness == pytest.approx(truth.stiffness[i], rel=0.01)
