@@ -19,6 +19,12 @@ quadratic form of the columns in a matrix W, and multipliers u, v >= 0 of these 
 
 The maximum over s is searched from many states; it is not a proof of the largest value, and the result says so.
 
+The bound is loose, and a tight one of this kind is not to be had at a bearable cost. That a measure may mix several
+motions is not the reason: for the leg of the paper the best mixture of motions that keep the limits is 0.2 above the
+best of them in log det, this bound 10.5. What is missing is that the states follow each other on one closed path. Only
+conditions for every function h hold a measure to closed paths; the number of those of a degree grows as its power of
+2 n, each one is another multiplier, and their maximum is over 3 n states that is searched anyway.
+
 References:
     van der Corput, Schaake, Ungleichungen fuer Polynome und trigonometrische Polynome, Compositio Mathematica, 1935.
     Kiefer, Wolfowitz, The equivalence of two extremum problems, Canadian J. Mathematics, 1960.
@@ -52,6 +58,9 @@ _FINEST = 1e-2
 @dataclass(frozen=True)
 class EfficiencyBound:
     """A bound on log det of all periodic motions.
+
+    It is loose, so that efficiencies may be far higher than it says: a measure over states need not follow one closed
+    path.
 
     Attributes:
         log_det: no motion with these harmonics in these limits was found to be able to exceed it.
