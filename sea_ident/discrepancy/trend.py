@@ -20,6 +20,12 @@ LEVEL = 1e-3
 MOST_TRENDS = 2
 """Largest number of trends that are named."""
 
+CARRIED_ON = 0.3
+"""Share of what a trend would do after the first period that it must do there, or it was a settling start [-], ..."""
+
+CHANCE = 4.0
+"""... and what it must do there for each of its columns: more than two standard deviations."""
+
 EQUALLY_GOOD = 13.8
 """Two trends between whose gains there is less than this (odds of a thousand) are not told apart."""
 
@@ -112,17 +118,21 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     directions = _directions(bench, fit, whitener / np.sqrt(periods), free, middle, temperature)
     omnibus = _omnibus(flat, middle, noise)
     notes: tuple[str, ...] = ()
-    if omnibus < LEVEL and periods > FEWEST_AFTER_START:
+    tests = max(len(directions), 1)
+    if periods > FEWEST_AFTER_START:
         later = flat[1:] - flat[1:].mean(axis=0)
         settled = _omnibus(later, middle[1:], noise)
-        if settled > LEVEL:
+        started = omnibus < LEVEL < settled
+        if not started and directions:
+            best, p_value = _most_likely(flat, directions, [_gain(flat, d) for d in directions], tests, noise)
+            started = p_value < LEVEL and _only_in_the_first(flat, later, directions[best])
+        if started:
             notes = (
                 f"{bench.data.source}: the first period differs from the {periods - 1} later ones, which are "
                 "alike: the motion was still settling. It was left out of the search for trends; start recording later",
             )
             flat, middle, omnibus, periods = later, middle[1:], settled, periods - 1
             directions = [d.over(slice(1, None)) for d in directions]
-    tests = max(len(directions), 1)
     named: list[tuple[_Direction, float, float]] = []
     left = flat
     while len(named) < MOST_TRENDS and directions:
@@ -213,6 +223,13 @@ def _gain(flat: FloatArray, direction: _Direction) -> float:
         if np.any(values > 0.0) and np.any(values < 0.0):
             return 0.0
     return float(along @ along)
+
+
+def _only_in_the_first(flat: FloatArray, later: FloatArray, direction: _Direction) -> bool:
+    """Whether a trend is not seen without the first period."""
+    rest = direction.over(slice(1, None))
+    expected = _gain(flat, direction) * float(np.sum(rest.profile**2) / np.sum(direction.profile**2))
+    return _gain(later, rest) < max(CARRIED_ON * expected, CHANCE * direction.basis.shape[1])
 
 
 def _most_likely(

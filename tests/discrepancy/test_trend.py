@@ -6,6 +6,7 @@ import pytest
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import _Direction, _explained, _gain, _omnibus, _scatter_p, _values, compare_periods
 from sea_ident.effects import make_effect
+from sea_ident.recordings import Recording
 
 LEVEL = 0.05
 DRAWS = 1000
@@ -50,6 +51,19 @@ def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
     found = compare_periods(bench, now.fit, now.noise)
     assert found.p_value > 1e-3
     assert (found.trends, found.unnamed, found.notes) == ((), False, ())
+
+
+@pytest.mark.parametrize("amplitude", [3.0, 6.0])
+def test_a_start_that_still_settles_is_no_trend(laboratory, amplitude):
+    """The first period is pulled, strongly at first and less and less: said, and not named."""
+    recording = laboratory.record(periods=8)
+    since = recording.time - recording.time[0]
+    current = recording.columns["current_knee"] + amplitude * np.exp(-since / 1.5) * (since < 5.0)
+    pulled = Recording(recording.time, {**recording.columns, "current_knee": current}, "pulled")
+    found = compared(laboratory.bench(pulled))
+    assert found.trends == ()
+    assert not found.unnamed
+    assert "the first period differs from the 7 later ones" in found.notes[0]
 
 
 def test_three_periods_show_no_trend(laboratory):
