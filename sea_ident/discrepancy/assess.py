@@ -97,10 +97,14 @@ class Transfer:
     Attributes:
         share: of what it could explain there, what it does explain with its parameters as they are [-].
         tested: whether there was enough to explain to tell.
+        statistic: weighted sum of squares that is left there with its parameters as they are.
+        unit: the same over its degrees of freedom with everything free, at least what noise leaves [-].
     """
 
     share: float
     tested: bool
+    statistic: float = 0.0
+    unit: float = 1.0
 
     @property
     def holds(self) -> bool:
@@ -142,7 +146,8 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         columns = max(len(fit.effects[position].columns(bench.robot)), 1)
         tested = significance(possible, columns, 10, without, noise) < FAMILY_LEVEL
         share = (without.statistic - fixed.statistic) / possible if possible > 0.0 else 0.0
-        out.append(Transfer(float(share), bool(tested)))
+        unit = now.fit.statistic / max(now.fit.dof, 1)
+        out.append(Transfer(float(share), bool(tested), fixed.statistic, max(unit, 1.0)))
     return out
 
 

@@ -12,6 +12,7 @@ from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
 from sea_ident.discrepancy.confirm import confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.decide import decide
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
@@ -115,8 +116,12 @@ def diagnose(
     alternatives = assess.rivals(bench, selection) if basic is None else {}
     tell("testing on held-out data", 0.75)
     held, held_notes = held_out(bench, selection, holdout)
+    if held is not None and held.other_motion and any(alternatives.values()):
+        selection, alternatives, held = decide(bench, selection, alternatives, held)
+        confirmed = confirmed.less(selection)
     weak = [] if held is None else [k for k, found in enumerate(held.transfers) if not found.holds]
-    if held is not None and 0 < len(weak) < selection.added and held.other_motion:
+    beside = selection.added + len(trends.trends)
+    if held is not None and 0 < len(weak) < beside and held.other_motion:
         # what does not hold elsewhere beside what does was the form of the latter, no effect of its own
         confirmed = confirmed.less(without(bench, selection, weak))
         selection = confirmed.selection

@@ -229,7 +229,7 @@ def _only_in_the_first(flat: FloatArray, later: FloatArray, direction: _Directio
     """Whether a trend is not seen without the first period."""
     rest = direction.over(slice(1, None))
     expected = _gain(flat, direction) * float(np.sum(rest.profile**2) / np.sum(direction.profile**2))
-    return _gain(later, rest) < max(CARRIED_ON * expected, CHANCE * direction.basis.shape[1])
+    return bool(_gain(later, rest) < max(CARRIED_ON * expected, CHANCE * direction.basis.shape[1]))
 
 
 def _most_likely(
