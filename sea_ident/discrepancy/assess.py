@@ -51,6 +51,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
+            if _slowest(new.effects[position]):
+                continue
             if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
@@ -58,6 +60,11 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
         found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
     return found
+
+
+def _slowest(effect: Effect) -> bool:
+    """Whether a wave along a path ended as the longest that there is: then it only stands in for a constant."""
+    return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.shapes)
 
 
 def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
