@@ -26,6 +26,12 @@ LEAST_STIFFNESS = 0.02
 WHITENINGS_KEPT = 3
 """Noise floors of which whitened columns are kept."""
 
+RUNAWAY = 0.3
+"""Share of the torque of the motor beyond which an effect must not grow ..."""
+
+RUNAWAY_STEP = 1.2
+"""... by more than this factor with one step of its shape."""
+
 STANDS_STILL = 1e-3
 """A step of the shapes that takes less than this share of the excess was the last."""
 
@@ -333,10 +339,21 @@ class Bench(Tangents):
             ahead = fit.values + follow @ step
             start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
             new = self.fit(effects, noise, start=start, tangents=False)
-            if new.statistic < fit.statistic:
+            if new.statistic < fit.statistic and not self._runs_away(fit, new):
                 return new
             step = step / 3.0
         return None
+
+    def _runs_away(self, before: Fit, after: Fit) -> bool:
+        """Whether an effect beside the model becomes large by a step of its shape: others then cancel it."""
+        counts = self.counts(after.effects)
+        for position in range(len(self.effects), len(after.effects)):
+            own = slice(sum(counts[:position]), sum(counts[: position + 1]))
+            torques = [self.column_spectra(f.effects[position], f.effects) @ f.values[own] for f in (before, after)]
+            sizes = [np.sqrt(np.sum(np.abs(torque) ** 2, axis=0)) for torque in torques]
+            if np.any((sizes[1] > RUNAWAY * self.torque_rms) & (sizes[1] > RUNAWAY_STEP * sizes[0])):
+                return True
+        return False
 
     def period_residuals(self, fit: Fit) -> ComplexArray:
         """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""

@@ -23,6 +23,9 @@ ONLY_AGAINST_REFERENCE = ("payload",)
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
 
+LARGEST_OF_MANY = 0.5
+"""Torque of a shape, as a share of the torque of the motor, beyond which another shape is taken where there is one."""
+
 ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
 
@@ -149,6 +152,13 @@ def examine(
     values = values / np.where(norms > 0.0, norms, 1.0).reshape(count, width)
     gains = np.einsum("vk,vk->v", score * norms.reshape(count, width), values)
     allowed = np.array([_allowed(bench, fit, variant, value) for variant, value in zip(variants, values, strict=True)])
+    if count > 1:
+        # a wave that is much longer than the path bends like what is there already, and is as large as you like
+        own = np.einsum("hevk,vk->hev", whole.reshape(harmonics, -1, count, width)[:, touched], values)
+        sizes = np.sqrt(np.sum(np.abs(own) ** 2, axis=0)) / np.maximum(bench.torque_rms[touched, None], 1e-300)
+        modest = np.max(sizes, axis=0, initial=0.0) <= LARGEST_OF_MANY
+        if np.any(allowed & modest):
+            gains = np.where(modest, gains, -1.0)
     # those that single precision leaves in doubt are looked at one by one, as are the best
     doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= 10 else set()
     tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
