@@ -1,0 +1,55 @@
+"""Two effects that one motion does not tell apart: another motion chooses, whichever was named first."""
+
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.decide import decide
+from sea_ident.discrepancy.findings import Alternative
+from sea_ident.discrepancy.heldout import tried
+from sea_ident.discrepancy.search import Selection, refitted
+from sea_ident.discrepancy.settle import Settled, settle
+
+JOINT = "knee"
+
+
+@pytest.fixture(scope="module")
+def rivals(laboratory):
+    """An offset in the spring of the knee, fitted by itself and by hysteresis, and another motion of the same leg."""
+    planted = [("spring_offset", JOINT, [0.5], {})]
+    bench = laboratory.bench(laboratory.record(planted, periods=12))
+    other = Bench(laboratory.data(laboratory.record(planted, periods=8, seed=9, motion=1)), bench.effects)
+    start = settle(bench, bench.effects)
+    found = {c.effect.name: c for c in scan(bench, start.fit, start.noise) if c.effect.joint == JOINT}
+    fits = {
+        name: refitted(bench, start.fit.effects, found[name].effect, (), start.noise, start.fit.parameters)
+        for name in ("spring_offset", "spring_hysteresis")
+    }
+    return bench, other, start, fits
+
+
+def decided(rivals, own, alternative):
+    bench, other, start, fits = rivals
+    position = len(start.fit.effects)
+    selection = Selection(start, Settled(fits[own], start.noise), 1, (1e-9,))
+    listed = {position: (Alternative(alternative, JOINT, 1.0, fits[alternative]),)}
+    held = tried(other, selection, "another motion")
+    selection, left, held = decide(bench, selection, listed, held)
+    return selection.effects[0].name, [a.effect for a in left[position]], held
+
+
+def test_what_holds_on_the_other_motion_is_taken(rivals):
+    name, left, held = decided(rivals, "spring_hysteresis", "spring_offset")
+    assert (name, left) == ("spring_offset", [])
+    assert held.transfers[0].holds
+    assert held.transfers[0].share > 0.9
+
+
+def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
+    name, left, _ = decided(rivals, "spring_offset", "spring_hysteresis")
+    assert (name, left) == ("spring_offset", [])
+
+
+def test_what_holds_there_as_well_stays_possible(rivals):
+    name, left, _ = decided(rivals, "spring_offset", "spring_offset")
+    assert (name, left) == ("spring_offset", ["spring_offset"])
