@@ -47,13 +47,23 @@ class Laboratory:
 
 
 @pytest.fixture(scope="session")
-def laboratory():
-    leg = sea_ident.load_robot("exo_leg")
-    motions = tuple(
+def leg():
+    """The elastic leg."""
+    return sea_ident.load_robot("exo_leg")
+
+
+@pytest.fixture(scope="session")
+def series(leg):
+    """Two short motions of it."""
+    return [
         sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
         for seed in (0, 1)
-    )
-    return Laboratory(leg, motions)
+    ]
+
+
+@pytest.fixture(scope="session")
+def laboratory(leg, series):
+    return Laboratory(leg, tuple(series))
 
 
 @pytest.fixture(scope="session")

@@ -26,11 +26,6 @@ def planted():
 
 
 @pytest.fixture(scope="module")
-def leg():
-    return sea_ident.load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
 def recordings(leg):
     return [
         simulate(

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import sea_ident
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
@@ -19,11 +18,9 @@ START, STOP = 4.13, 0.62
 
 
 @pytest.fixture(scope="module")
-def pushed():
-    leg = sea_ident.load_robot("exo_leg")
-    series = sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=0).series
+def pushed(leg, series):
     push = make_effect("external_force", "knee", start=START, stop=STOP, period=PERIOD)
-    found = simulate(leg, series, periods=8, seed=3, effects=(PlantedEffect(push, np.array([4.0, 0.0, 2.0])),))
+    found = simulate(leg, series[0], periods=8, seed=3, effects=(PlantedEffect(push, np.array([4.0, 0.0, 2.0])),))
     data = period_data(wide_processing(found.recording, leg, PERIOD), leg)
     bench = Bench(data, (*base_effects(leg), *spring_effects(leg)))
     return bench, settle(bench, bench.effects)

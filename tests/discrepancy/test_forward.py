@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import sea_ident
 from sea_ident.discrepancy.data import wide_processing
 from sea_ident.discrepancy.forward import common_power, noise_power, simulation_gap, spread_of_power
 from sea_ident.effects import base_effects, make_effect
@@ -15,19 +14,6 @@ from sea_ident.simulation import FrictionJitter, PlantedEffect, SensorNoise, sim
 PERIOD = 5.0
 # without noise there is nothing to compare a residual with, and a model that lacks something says so
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
-
-
-@pytest.fixture(scope="module")
-def leg():
-    return sea_ident.load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
-def series(leg):
-    return [
-        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
-        for seed in (0, 1)
-    ]
 
 
 def exact(leg, series, planted, periods=2):

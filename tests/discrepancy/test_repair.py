@@ -41,19 +41,6 @@ KINDS = {
 QUICK = ("signal",)
 
 
-@pytest.fixture(scope="module")
-def leg():
-    return sea_ident.load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
-def series(leg):
-    return [
-        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
-        for seed in (0, 1)
-    ]
-
-
 def diagnosed(model, recording):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)

@@ -19,19 +19,6 @@ from sea_ident.simulation import PlantedEffect, simulate
 PERIOD = 5.0
 
 
-@pytest.fixture(scope="module")
-def leg():
-    return sea_ident.load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
-def series(leg):
-    return [
-        sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed).series
-        for seed in (0, 1)
-    ]
-
-
 def scaled(series, amplitude):
     return FourierSeries(series.base_frequency, series.offset, amplitude * series.a, amplitude * series.b)
 

@@ -14,10 +14,8 @@ PERIOD = 5.0
 
 
 @pytest.fixture(scope="module")
-def settled():
-    leg = sea_ident.load_robot("exo_leg")
-    series = sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=0).series
-    recording = simulate(leg, series, periods=6, seed=3).recording
+def settled(leg, series):
+    recording = simulate(leg, series[0], periods=6, seed=3).recording
     model = sea_ident.identify(leg, recording, period=PERIOD)
     bench = Bench(period_data(wide_processing(recording, leg, PERIOD), leg), model_effects(model))
     return bench, settle(bench, bench.effects)

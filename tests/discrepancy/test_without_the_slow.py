@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import sea_ident
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.conclude import unexplained
 from sea_ident.discrepancy.confirm import confirm, without_the_slow
@@ -19,11 +18,9 @@ PERIOD = 5.0
 
 
 @pytest.fixture(scope="module")
-def lingering():
+def lingering(leg, series):
     """A ripple at a hip that lingers twice in a period, and there a torque that no model has."""
-    leg = sea_ident.load_robot("exo_leg")
-    series = sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=0).series
-    motion = series.sample(samples=1000)
+    motion = series[0].sample(samples=1000)
     phase = 2 * np.pi * motion.time / PERIOD
     velocity = np.sin(phase) ** 3 * (1 + 0.6 * np.cos(2 * phase))
     path = np.cumsum(velocity - velocity.mean())
