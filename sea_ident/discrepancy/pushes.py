@@ -26,6 +26,13 @@ FEWEST_PASSES = 3
 REVERSAL = 0.05
 """Time around a reversal in which no push is looked for where nothing repeats [s]."""
 
+SHORTEST = 0.01
+"""What departs for less than this is a spike of a sensor or the instant of a jump of friction, no push [s]."""
+
+CLEAR_AT_REVERSAL = 0.06
+"""Around a reversal friction that differs from pass to pass departs for up to this [s]: what is shorter counts only
+beside pushes that are clear."""
+
 LONGEST = 0.25
 """Share of the recording that pushes at a joint may take; beyond it the residual is no push but a poor model."""
 
@@ -55,7 +62,8 @@ def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_
     """Find where a residual departs for a short time from what it is otherwise.
 
     Where the motion repeats itself, the median over the passes is taken off first: friction at reversals and whatever
-    else the model lacks comes again in every pass, a push does not. Where it does not repeat itself, the time around
+    else the model lacks comes again in every pass, a push does not. Around reversals, where friction differs from pass
+    to pass, only what lasts is a push by itself. Where the motion does not repeat itself, the time around
     reversals is left aside instead.
 
     Args:
@@ -75,11 +83,12 @@ def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_
     for i in range(residual.shape[1]):
         smooth = uniform_filter1d(own[:, i], window)
         usable = np.ones(len(time), dtype=np.bool_)
+        reversing = _near_reversal(speed[:, i], round(REVERSAL / interval))
         if not repeats:
-            usable = ~_near_reversal(speed[:, i], round(REVERSAL / interval))
+            usable = ~reversing
             # slow misfit is not a push
             smooth = smooth - _slow(smooth, usable, max(window, round(0.5 / interval)))
-        found.extend(_runs(i, time, own[:, i], smooth, usable))
+        found.extend(_runs(i, time, own[:, i], smooth, usable, reversing))
     return tuple(sorted(found, key=lambda p: p.start))
 
 
@@ -120,7 +129,14 @@ def _near_reversal(speed: FloatArray, reach: int) -> NDArray[np.bool_]:
     return np.asarray(binary_dilation(slow | crossing, iterations=max(reach, 1)), dtype=np.bool_)
 
 
-def _runs(joint: int, time: FloatArray, own: FloatArray, smooth: FloatArray, usable: NDArray[np.bool_]) -> list[Push]:
+def _runs(
+    joint: int,
+    time: FloatArray,
+    own: FloatArray,
+    smooth: FloatArray,
+    usable: NDArray[np.bool_],
+    reversing: NDArray[np.bool_],
+) -> list[Push]:
     interval = float(time[1] - time[0])
     if np.count_nonzero(usable) < 16:
         return []
@@ -135,7 +151,8 @@ def _runs(joint: int, time: FloatArray, own: FloatArray, smooth: FloatArray, usa
     near = binary_dilation(high, iterations=gap)
     joined = binary_dilation(low & near, iterations=max(1, gap // 4))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], joined.astype(int), [0]])))
-    found = []
+    found: list[Push] = []
+    clear = False
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         inside = np.flatnonzero((low & near)[first:last]) + first
         if not np.any(high[first:last]):
@@ -148,6 +165,10 @@ def _runs(joint: int, time: FloatArray, own: FloatArray, smooth: FloatArray, usa
         end = int(last - 1 - np.argmax(high[first:last][::-1]))
         while end + 1 < len(low) and low[end + 1]:
             end += 1
+        length = float(time[end] - time[begin]) + 0.5 * interval
+        if length < SHORTEST:
+            continue
+        clear = clear or not reversing[peak] or length >= CLEAR_AT_REVERSAL
         span = slice(begin, end + 1)
         found.append(
             Push(
@@ -155,6 +176,6 @@ def _runs(joint: int, time: FloatArray, own: FloatArray, smooth: FloatArray, usa
                 float(own[span].sum() * interval), float(abs(smooth[peak]) / spread),
             )
         )  # fmt: skip
-    if sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
+    if not clear or sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
         return []
     return found

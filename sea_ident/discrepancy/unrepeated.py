@@ -28,7 +28,7 @@ from sea_ident.discrepancy.findings import (
     Verdict,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance
+from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import FAMILY_LEVEL
@@ -56,6 +56,9 @@ AFTER_PUSH = 0.05
 
 MOST_ALIKE = 0.05
 """A candidate that comes within this share of the gain of the best is not told from it."""
+
+VISIBLE = 0.1
+"""Share of the torque of an effect that the rest of the model must not take up for it to be named [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +196,8 @@ def _search(bench: StretchBench, start: Settled) -> tuple[Settled, list[_Found]]
             gain = fit.statistic - new.statistic
             p_value = significance(gain, candidate.columns, tests, fit, now.noise)
             if p_value > FAMILY_LEVEL or not physical(bench, new, -1) or at_a_bound(new.effects[-1]):
+                continue
+            if torque_change(bench, fit, new) < VISIBLE * own_torque(bench, new, -1):
                 continue
             errors = block_errors(bench, new.effects, now.noise)
             better = int(np.count_nonzero(errors < without))

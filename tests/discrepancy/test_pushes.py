@@ -1,10 +1,17 @@
 """Pushes are found to the sample where they are, and none where nothing pushes."""
 
+import warnings
+
 import numpy as np
 import pytest
 
+import sea_ident
+from sea_ident.discrepancy.data import wide_processing
 from sea_ident.discrepancy.pushes import find_pushes, pushed, repeated
+from sea_ident.discrepancy.unrepeated import pushes_between_passes
+from sea_ident.exceptions import SeaIdentWarning
 
+PERIOD = 5.0
 INTERVAL = 0.01
 SAMPLES = 500
 """Of one pass."""
@@ -84,3 +91,13 @@ def test_pushed_is_the_push_and_its_margin_at_its_joint():
     assert abs(here[0] - 990) <= 1
     assert abs(here[-1] - 1059) <= 1
     assert not np.any(pushed(found, TIME, 1, 0.1))
+
+
+@pytest.mark.parametrize(("periods", "seed"), [(4, 1), (6, 6), (9, 9)])
+def test_friction_that_differs_from_pass_to_pass_is_no_push(laboratory, periods, seed):
+    recording = laboratory.record(periods=periods, seed=seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
+        processed = wide_processing(recording, laboratory.leg, PERIOD)
+        assert pushes_between_passes(model, recording, processed) == ()
