@@ -16,6 +16,7 @@ from sea_ident.estimation import (
     Robust,
     identify,
 )
+from sea_ident.estimation.estimators.instrumental_variables import _invertible
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.processing import process
 
@@ -132,3 +133,17 @@ def test_samples_without_scatter_do_not_count_for_ever(leg, truth):
     assert any("no scatter" in text for text in model.warnings)
     error = (model.values - model.base.project(truth.parameters)) / np.abs(model.base.project(truth.parameters))
     assert np.abs(error).max() < 0.5
+
+
+def test_columns_that_are_hardly_told_apart_are_uncertain_and_no_crash():
+    rng = np.random.default_rng(4)
+    columns = rng.standard_normal((200, 3))
+    apart = columns.T @ columns
+    assert _invertible(apart) is apart
+    columns[:, 2] = 1e3 * columns[:, 1]
+    cross = _invertible(columns.T @ columns)
+    inverse = np.linalg.inv(cross)
+    assert np.all(np.isfinite(inverse))
+    # the one that is told keeps its variance, the pair is as good as unknown
+    assert inverse[0, 0] == pytest.approx(np.linalg.inv(apart)[0, 0], rel=0.1)
+    assert inverse[1, 1] > 1e6 * inverse[0, 0]

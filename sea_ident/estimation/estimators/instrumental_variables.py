@@ -18,6 +18,10 @@ Simulator = Callable[[Observations, FloatArray], Motion]
 """From observations and base parameters (b,) to the motion, without noise, at the samples of the mean period."""
 
 
+LEAST_TOLD = 1e-13
+"""Smallest singular value of the products of normalised columns that double precision tells from nothing."""
+
+
 @dataclass(frozen=True)
 class InstrumentalVariables(Estimator):
     """Solve ``Z' (torque - F psi) = 0`` with instruments Z that have the signal of F but not its noise.
@@ -62,7 +66,7 @@ class InstrumentalVariables(Estimator):
                     "times of the mean motion"
                 )
             instruments = observations.rows_of(motion).total * weights[:, :, None]
-            cross = instruments.reshape(-1, count).T @ flat
+            cross = _invertible(instruments.reshape(-1, count).T @ flat)
             before, values = values, np.linalg.solve(cross, np.einsum("knb,kn->b", instruments, torque))
             moved = float(np.max(np.abs(values - before) / np.maximum(np.abs(values), 1e-12)))
             if moved < 1e-4:
@@ -87,10 +91,25 @@ def _other_periods(observations: Observations, first: SampleWeights) -> Estimate
         instruments = (whole - rows.total) / (periods - 1.0) * weights[:, :, None]
         cross += instruments.reshape(-1, count).T @ rows.total.reshape(-1, count)
         side += np.einsum("knb,kn->b", instruments, processed.period_tau_motor[p])
+    cross = _invertible(cross)
     values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
     mean_instruments = whole / periods * weights[:, :, None]
     note = "the instruments of every period are the regressors of the other periods"
     return _estimate(first, values, mean_instruments, cross / periods, note)
+
+
+def _invertible(cross: FloatArray) -> FloatArray:
+    """Products (b, b) that have an inverse: what two columns hardly tell apart gets a standard deviation that says so.
+
+    Columns that differ just enough to be told apart have products that in double precision do not.
+    """
+    scale = np.sqrt(np.abs(np.diag(cross)))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    plain = cross / np.outer(scale, scale)
+    least = float(np.linalg.svd(plain, compute_uv=False)[-1])
+    if least > LEAST_TOLD:
+        return cross
+    return np.asarray((plain + LEAST_TOLD * np.eye(len(plain))) * np.outer(scale, scale), dtype=np.float64)
 
 
 def _estimate(
