@@ -255,7 +255,7 @@ class Bench(Tangents):
         left = self.whitening(noise).flat(fit.residual * fit.scale)
         return float(left @ left)
 
-    def clean_residual(self, fit: Fit, noise: NoiseFloor) -> ComplexArray:
+    def clean_residual(self, fit: Fit) -> ComplexArray:
         """(H + 1, E) residual of a fit without what the samples that are left out put into it [N m].
 
         All harmonics and equations count alike, whatever their noise: where something is missing, it would be spread to

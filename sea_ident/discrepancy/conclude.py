@@ -234,7 +234,7 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
 
 def _per_joint(bench: Bench, fit: Fit, noise: NoiseFloor) -> dict[str, dict[str, float]]:
     """Energy of the residual over that of the noise by joint and equation."""
-    clean = np.sum(np.abs(bench.clean_residual(fit, noise)) ** 2, axis=0)
+    clean = np.sum(np.abs(bench.clean_residual(fit)) ** 2, axis=0)
     out: dict[str, dict[str, float]] = {joint: {} for joint in bench.robot.joint_names}
     for e, equation in enumerate(bench.data.equations):
         out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise.std[e] ** 2, 1e-300))
@@ -255,8 +255,8 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
     return Waveforms(
         time=data.motion.time - data.motion.time[0],
         equations=labels,
-        before=waveform(bench.clean_residual(before, noise), data.samples),
-        after=waveform(bench.clean_residual(after, noise), data.samples),
+        before=waveform(bench.clean_residual(before), data.samples),
+        after=waveform(bench.clean_residual(after), data.samples),
         noise=noise.std,
         q=data.motion.q,
         dtheta=data.motion.dtheta,

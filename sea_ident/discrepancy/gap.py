@@ -11,7 +11,7 @@ from sea_ident.discrepancy.noise import NoiseFloor
 
 def excess_power(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
     """(E,) mean square of the mean residual beyond that of its noise, at least zero [(N m)^2]."""
-    clean = bench.clean_residual(fit, noise)
+    clean = bench.clean_residual(fit)
     power = np.sum(np.abs(clean) ** 2, axis=0)
     freedom = fit.dof / max(len(fit.whitened), 1)
     return np.asarray(np.maximum(power - freedom * noise.std**2, 0.0), dtype=np.float64)

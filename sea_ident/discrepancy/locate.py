@@ -20,7 +20,7 @@ MOST = 60
 def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
     """Excess energy of the mean residual by joint, equation and regime, the strongest first."""
     data = bench.data
-    residual = waveform(bench.clean_residual(fit, noise), data.samples)
+    residual = waveform(bench.clean_residual(fit), data.samples)
     found = []
     numbers = 2 * data.harmonics + 1
     for e, equation in enumerate(data.equations):

@@ -129,7 +129,7 @@ def test_a_leg_that_lacks_nothing_leaves_its_noise(laboratory, nothing_missing):
         statistic, dof, p_value = lack_of_fit(bench, now)
         assert (statistic, dof) == (now.fit.statistic, now.fit.dof)
         assert p_value > 1e-3
-        clean = np.sqrt(np.sum(np.abs(bench.clean_residual(now.fit, now.noise)) ** 2, axis=0))
+        clean = np.sqrt(np.sum(np.abs(bench.clean_residual(now.fit)) ** 2, axis=0))
         np.testing.assert_array_less(clean, 1.5 * now.noise.std)
         np.testing.assert_array_less(0.5 * now.noise.std, clean)
 
