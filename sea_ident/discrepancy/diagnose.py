@@ -10,19 +10,19 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
-from sea_ident.discrepancy.confirm import confirm, without_the_slow
+from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.decide import decide
+from sea_ident.discrepancy.decide import Alternatives, decide
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
-from sea_ident.discrepancy.heldout import HeldOut, held_out
+from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import compare_periods
+from sea_ident.discrepancy.trend import TrendTest, compare_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.estimation import Model
@@ -109,24 +109,13 @@ def diagnose(
         if second is not None:
             bench, confirmed = second.bench, second
             slow_notes = (words.slow_samples(bench.data),)
-    selection = confirmed.selection
     tell("comparing the periods", 0.5)
     trends = compare_periods(confirmed.bench, confirmed.final.fit, confirmed.final.noise, temperature)
     tell("looking for alternatives", 0.6)
-    alternatives = assess.rivals(bench, selection) if basic is None else {}
+    alternatives = assess.rivals(bench, confirmed.selection) if basic is None else {}
     tell("testing on held-out data", 0.75)
-    held, held_notes = held_out(bench, selection, holdout)
-    if held is not None and held.other_motion and any(alternatives.values()):
-        selection, alternatives, held = decide(bench, selection, alternatives, held)
-        confirmed = confirmed.less(selection)
-    weak = [] if held is None else [k for k, found in enumerate(held.transfers) if not found.holds]
-    beside = selection.added + len(trends.trends)
-    if held is not None and 0 < len(weak) < beside and held.other_motion:
-        # what does not hold elsewhere beside what does was the form of the latter, no effect of its own
-        confirmed = confirmed.less(without(bench, selection, weak))
-        selection = confirmed.selection
-        alternatives = assess.rivals(bench, selection)
-        held, held_notes = held_out(bench, selection, holdout)
+    confirmed, alternatives, held, held_notes = _tested(bench, confirmed, alternatives, trends, holdout)
+    selection = confirmed.selection
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
@@ -143,6 +132,38 @@ def diagnose(
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return diagnosis
+
+
+def _tested(
+    bench: Bench,
+    confirmed: Confirmed,
+    alternatives: Alternatives,
+    trends: TrendTest,
+    holdout: Recording | ProcessedRecording | None,
+) -> tuple[Confirmed, Alternatives, HeldOut | None, tuple[str, ...]]:
+    """What was found, tested on data that were not used.
+
+    Another motion decides between equals, and what does not hold on it beside what does was the form of the latter, no
+    effect of its own.
+    """
+    held, notes = held_out(bench, confirmed.selection, holdout)
+    if held is None or not held.other_motion:
+        return confirmed, alternatives, held, notes
+    if any(alternatives.values()):
+        selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
+        confirmed = confirmed.less(selection)
+    weak = [k for k, found in enumerate(held.transfers) if not found.holds]
+    if 0 < len(weak) < confirmed.selection.added + len(trends.trends):
+        selection = without(bench, confirmed.selection, weak)
+        alternatives = assess.rivals(bench, selection)
+        held = replace(
+            tried(held.bench, selection, held.source),
+            processed=held.processed, recording=held.recording, warnings=held.warnings,
+        )  # fmt: skip
+        if any(alternatives.values()):
+            selection, alternatives, held = decide(bench, selection, alternatives, held)
+        confirmed = confirmed.less(selection)
+    return confirmed, alternatives, held, notes
 
 
 def _unsearched(bench: Bench) -> Selection:
