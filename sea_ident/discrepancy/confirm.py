@@ -12,6 +12,18 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
+FAR = 6
+"""How many times the usual is left out around reversals where the search is repeated without what is slow."""
+
+MOST_LEFT_OUT = 0.6
+"""Share of the samples of an equation beyond which too little is left to search [-]."""
+
+PROMISING = 0.3
+"""Share of the excess there that a candidate must promise to explain for the search to be repeated [-]."""
+
+RESOLVED = 0.5
+"""Share of the misfit that the repeated search may leave of what the first left there, where it leaves any [-]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Confirmed:
@@ -36,19 +48,6 @@ class Confirmed:
         """The same with less found."""
         final = settle_again(self.bench, selection.final.fit) if selection.added else self.start
         return replace(self, selection=selection, final=final)
-
-
-FAR = 6
-"""How many times the usual is left out around reversals where the search is repeated without what is slow."""
-
-MOST_LEFT_OUT = 0.6
-"""Share of the samples of an equation beyond which too little is left to search [-]."""
-
-PROMISING = 0.3
-"""Share of the excess there that a candidate must promise to explain for the search to be repeated [-]."""
-
-RESOLVED = 0.5
-"""Share of the misfit that the repeated search may leave of what the first left there, where it leaves any [-]."""
 
 
 def confirm(bench: Bench, selection: Selection) -> Confirmed:

@@ -30,23 +30,30 @@ def decide(
     """
     kept: Alternatives = {}
     first = len(selection.final.fit.effects) - selection.added
+    noise, changed = selection.final.noise, False
     for position, others in alternatives.items():
         own = held.transfers[position - first]
         left: list[Alternative] = []
         for other in others:
-            if other.fit is None:
+            fit = other.fit
+            if fit is None:
                 left.append(other)
                 continue
-            replaced = replace(selection, final=Settled(other.fit, selection.final.noise))
+            if changed:
+                # it was fitted beside an effect that is out by now
+                effects = list(selection.final.fit.effects)
+                effects[position] = fit.effects[position]
+                fit = bench.fit(effects, noise, start=selection.final.fit.parameters)
+            replaced = replace(selection, final=Settled(fit, noise))
             there = tried(held.bench, replaced, held.source)
             rival = there.transfers[position - first]
             if _better(rival, own):
-                selection, own = replaced, rival
+                selection, own, changed = replaced, rival, True
                 held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
                 # what was no better than the one that is now out was no better than this one
                 left = []
             elif not _better(own, rival):
-                left.append(other)
+                left.append(replace(other, fit=fit))
         kept[position] = tuple(left)
     return selection, kept, held
 
@@ -55,4 +62,4 @@ def _better(one: Transfer, other: Transfer) -> bool:
     """Whether one effect does better than another on the other motion beyond doubt, and holds there."""
     if not (one.tested and one.holds):
         return False
-    return other.statistic - one.statistic > EQUALLY_GOOD * max(one.unit, 1.0)
+    return other.statistic - one.statistic > EQUALLY_GOOD * one.unit

@@ -53,3 +53,30 @@ def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
 def test_what_holds_there_as_well_stays_possible(rivals):
     name, left, _ = decided(rivals, "spring_offset", "spring_offset")
     assert (name, left) == ("spring_offset", ["spring_offset"])
+
+
+def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_turned_out_to_be(laboratory):
+    """Both effects are named wrongly, and both alternatives are right: neither is judged beside the other's error."""
+    planted = [("spring_offset", JOINT, [0.5], {}), ("load_dependent_friction", "hip", [0.1], {})]
+    bench = laboratory.bench(laboratory.record(planted, periods=12))
+    other = Bench(laboratory.data(laboratory.record(planted, periods=8, seed=9, motion=1)), bench.effects)
+    start = settle(bench, bench.effects)
+    found = {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
+    wrong = found["spring_hysteresis", JOINT], found["nonlinear_viscous_friction", "hip"]
+    right = found["spring_offset", JOINT], found["load_dependent_friction", "hip"]
+
+    def fitted(*added):
+        return bench.refine(
+            (*start.fit.effects, *added), start.noise, start=start.fit.parameters, only=len(bench.effects)
+        )
+
+    own = fitted(*wrong)
+    first = len(start.fit.effects)
+    listed = {
+        first: (Alternative("spring_offset", JOINT, 1.0, fitted(right[0], wrong[1])),),
+        first + 1: (Alternative("load_dependent_friction", "hip", 1.0, fitted(wrong[0], right[1])),),
+    }
+    selection = Selection(start, Settled(own, start.noise), 2, (1e-9, 1e-9))
+    selection, left, _ = decide(bench, selection, listed, tried(other, selection, "another motion"))
+    assert [e.name for e in selection.effects] == ["spring_offset", "load_dependent_friction"]
+    assert left == {first: (), first + 1: ()}
