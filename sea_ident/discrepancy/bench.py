@@ -26,6 +26,9 @@ LEAST_STIFFNESS = 0.02
 WHITENINGS_KEPT = 3
 """Noise floors of which whitened columns are kept."""
 
+NOISE_ROUNDS = 3
+"""Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by."""
+
 RUNAWAY = 0.3
 """Share of the torque of the motor beyond which an effect must not grow ..."""
 
@@ -362,10 +365,12 @@ class Bench(Tangents):
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor with the parameters of a fit."""
         residuals = self.period_residuals(fit)
-        plain = noise_from_periods(residuals)
-        whitening = self.whitening(plain)
-        taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
-        return noise_beside_model(residuals, plain, np.concatenate([whitening.free, taken], axis=1))
+        noise = noise_from_periods(residuals)
+        for _ in range(NOISE_ROUNDS):
+            whitening = Whitening(self, noise.whitener(), self._free)
+            taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
+            noise = noise_beside_model(residuals, noise, np.concatenate([whitening.free, taken], axis=1))
+        return noise
 
     @cached_property
     def torque_rms(self) -> FloatArray:

@@ -25,7 +25,13 @@ MOST_NUMBERS = 3200
 """Largest number of real coefficients that are compared, all equations together."""
 
 REGRESSOR_MARGIN = 1.25
-"""The regressor keeps this many times the harmonics that are compared."""
+"""The regressor keeps at least this many times the harmonics that are compared, ..."""
+
+WIDEST_MARGIN = 2.4
+"""... and up to this many where the noise of the encoders is small: friction turns faster than what is compared."""
+
+USED_SAMPLES = 0.8
+"""Share of the harmonics that the samples have which the regressor keeps at most."""
 
 
 REVERSAL_SAMPLES = 2
@@ -80,6 +86,7 @@ class PeriodData:
         channels: further mean signals (N, n) by kind.
         equations: (E,) equations.
         harmonics: H, harmonics that are compared.
+        reach: harmonics that the motion has.
         left_out: (N, E) samples of an equation that say nothing about a model.
         warnings: what a user should know.
         caution: how many times the usual is left out around reversals.
@@ -95,6 +102,7 @@ class PeriodData:
     channels: Mapping[str, FloatArray]
     equations: tuple[Equation, ...]
     harmonics: int
+    reach: int
     left_out: NDArray[np.bool_]
     warnings: tuple[str, ...] = ()
     caution: int = 1
@@ -158,14 +166,23 @@ def equations_of(robot: Robot) -> tuple[Equation, ...]:
 def harmonics_for(period: float, samples: int, equations: int) -> int:
     """Number of harmonics that a period of this length and this many samples is compared by."""
     by_frequency = int(HIGHEST_FREQUENCY * period)
-    by_samples = int((samples - 1) / 2 / REGRESSOR_MARGIN * 0.8)
+    by_samples = int(_most(samples) / REGRESSOR_MARGIN)
     return max(min(by_frequency, by_samples, MOST_HARMONICS, MOST_NUMBERS // (2 * equations)), 1)
+
+
+def _most(samples: int) -> float:
+    """Harmonics of a period of this many samples that are used at most."""
+    return USED_SAMPLES * (samples - 1) / 2
 
 
 def wide_processing(
     recording: Recording | ProcessedRecording, robot: Robot, period: float | None
 ) -> ProcessedRecording:
     """The recording with a regressor that reaches beyond the harmonics that are compared.
+
+    At a reversal friction jumps, and acceleration with it. A velocity without its high harmonics misses that corner,
+    and friction with it, in all samples nearby. How many harmonics can be kept is limited by the noise of the
+    encoders, which must not blur the sign of a velocity among samples that are used.
 
     Raises:
         RecordingError: if it lacks what is needed.
@@ -175,8 +192,30 @@ def wide_processing(
     first = process(recording, robot, period=period)
     if first.period is None:
         return first
-    wide = int(REGRESSOR_MARGIN * harmonics_for(first.period, first.samples, len(equations_of(robot))))
-    return process(recording, robot, period=first.period, link_harmonics=wide, motor_harmonics=wide)
+    compared = harmonics_for(first.period, first.samples, len(equations_of(robot)))
+    least = int(REGRESSOR_MARGIN * compared)
+    most = max(min(int(WIDEST_MARGIN * compared), int(_most(first.samples))), least)
+    wide = process(recording, robot, period=first.period, link_harmonics=most, motor_harmonics=most)
+    blurred = _blur(wide.period_motions)
+    if blurred <= 1.0 or most == least:
+        return wide
+    # the power of white noise in a velocity grows with the third power of the bandwidth
+    fewer = max(int(most * blurred ** (-2.0 / 3.0)), least)
+    return process(recording, robot, period=first.period, link_harmonics=fewer, motor_harmonics=fewer)
+
+
+def _blur(motions: Sequence[Motion]) -> float:
+    """Largest scatter of a velocity between periods, in units of what may be uncertain of its sign [-]."""
+    if len(motions) < 2:
+        return 1.0
+    largest = 0.0
+    for name in ("dq", "dtheta"):
+        speeds = np.stack([getattr(motion, name) for motion in motions])
+        scatter = np.median(np.std(np.diff(speeds, axis=0), axis=0), axis=0) / np.sqrt(2.0)
+        rms = np.sqrt(np.mean(speeds**2, axis=(0, 1)))
+        moving = rms > 0.0
+        largest = max(largest, float(np.max(UNCERTAIN_SIGN * scatter[moving] / (SLOWEST * rms[moving]), initial=0.0)))
+    return largest
 
 
 def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
@@ -192,10 +231,10 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         )
     if processed.period is None:
         raise DiagnosisError(f"{processed.source} is not periodic")
-    reach = min(processed.link_harmonics, processed.motor_harmonics)
+    least = min(processed.link_harmonics, processed.motor_harmonics)
     harmonics = min(
         harmonics_for(processed.period, processed.samples, len(equations_of(robot))),
-        max(int(reach / REGRESSOR_MARGIN), 1),
+        max(int(least / REGRESSOR_MARGIN), 1),
     )
     return PeriodData(
         robot=robot,
@@ -208,6 +247,7 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         channels=processed.channels,
         equations=equations_of(robot),
         harmonics=harmonics,
+        reach=max(processed.link_harmonics, processed.motor_harmonics),
         left_out=around_reversals(processed.motion, equations_of(robot), processed.period_motions),
         warnings=processed.warnings,
     )

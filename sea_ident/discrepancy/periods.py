@@ -11,8 +11,8 @@ from sea_ident.discrepancy.free_shapes import signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
 
-PERIOD_SAMPLES = 2.5
-"""Samples of a single period that its model torque is computed at, per harmonic compared."""
+PERIOD_SAMPLES = 2
+"""Samples of a single period that its model torque is computed at, per harmonic of its motion."""
 
 
 class Periods:
@@ -25,7 +25,7 @@ class Periods:
     def __init__(self, data: PeriodData) -> None:
         self.data = data
         self.robot = data.robot
-        stride = max(1, int(data.samples / (PERIOD_SAMPLES * data.harmonics)))
+        stride = max(1, data.samples // (PERIOD_SAMPLES * data.reach + 1))
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
 

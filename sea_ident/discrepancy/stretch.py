@@ -91,6 +91,7 @@ def stretch_data(processed: ProcessedRecording, robot: Robot, left_out: NDArray[
         channels=processed.channels,
         equations=equations,
         harmonics=harmonics_for(period, processed.samples, len(equations)),
+        reach=processed.samples // 2,
         left_out=out,
         warnings=processed.warnings,
     )

@@ -120,12 +120,14 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     notes: tuple[str, ...] = ()
     tests = max(len(directions), 1)
     if periods > FEWEST_AFTER_START:
-        later = flat[1:] - flat[1:].mean(axis=0)
+        later_periods = flat[1:]
+        later = later_periods - later_periods.mean(axis=0)
         settled = _omnibus(later, middle[1:], noise)
         started = omnibus < LEVEL < settled
         if not started and directions:
             best, p_value = _most_likely(flat, directions, [_gain(flat, d) for d in directions], tests, noise)
-            started = p_value < LEVEL and _only_in_the_first(flat, later, directions[best])
+            differs = min(p_value, _apart(flat[0], later_periods)) < LEVEL
+            started = differs and _only_in_the_first(flat, later, directions[best])
         if started:
             notes = (
                 f"{bench.data.source}: the first period differs from the {periods - 1} later ones, which are "
@@ -290,6 +292,16 @@ def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
     ratio = float(along @ along) / dof
     directions = min(noise_directions(flat), float(dof))
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(flat))))
+
+
+def _apart(first: FloatArray, later: FloatArray) -> float:
+    """Probability of the distance (M,) of the first period from the mean of the later ones (P - 1, M)."""
+    difference = (first - later.mean(axis=0)) / np.sqrt(1.0 + 1.0 / len(later))
+    dof = max(int(np.count_nonzero(np.abs(difference) > 0.0)), 1)
+    directions = min(noise_directions(later), float(dof))
+    spread = float(np.sum(np.diff(later, axis=0) ** 2)) / (2.0 * (len(later) - 1))
+    ratio = float(difference @ difference) / max(spread, 1e-300)
+    return float(stats.f.sf(ratio, directions, directions * step_freedom(len(later))))
 
 
 def _change(bench: Bench, flat: FloatArray, direction: _Direction, periods: int) -> float:

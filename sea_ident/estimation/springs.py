@@ -27,9 +27,14 @@ FOLDS = 10
 EXCITED = 0.25
 """Relative standard deviation of the stiffness beyond which a spring counts as not excited."""
 
-
 SUPPORT = 1e-3
 """Significance that a term beyond the linear spring needs."""
+
+ROUNDING = 1e-14
+"""Smallest to largest eigenvalue of normalised products below which columns are the same but for rounding."""
+
+SHARE = 0.1
+"""Part of a column in the combination that vanishes from which on it is named as one of the same [-]."""
 
 
 def identify_springs(
@@ -273,10 +278,28 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     gram = (periods * table.T @ table - own) / (periods - 1.0)
     if np.linalg.cond(gram) > 1e12:
         gram, side = table.T @ table, table.T @ torque
+        _tell_apart(data, gram)
     else:
         side = (periods * table.T @ torque - side) / (periods - 1.0)
     values = np.linalg.solve(gram, side) / norms
     return values, np.linalg.solve(gram, table.T) / norms[:, None]
+
+
+def _tell_apart(data: _SpringData, gram: FloatArray) -> None:
+    """Raise where columns of unit length with these products (c, c) are the same but for rounding."""
+    strength, directions = np.linalg.eigh(gram)
+    if strength[0] > ROUNDING * strength[-1]:
+        return
+    owners = ["the stiffness", "the cubic stiffness", "the damping"]
+    for effect, width in zip(data.effects, data.widths, strict=True):
+        owners.extend([effect.name] * width)
+    owners.append("the zero of the encoders")
+    alike = list(dict.fromkeys(owners[k] for k in np.flatnonzero(np.abs(directions[:, 0]) > SHARE)))
+    what = " and ".join(alike) if len(alike) > 1 else f"the parameters of {alike[0]}"
+    raise IdentificationError(
+        f"joint {data.name!r}: this motion does not tell {what} of its spring apart; leave one effect out, or excite "
+        "this joint more"
+    )
 
 
 def _covariance(

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.synthetic import leg_series, record, truth_of
+from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, identify_measured_springs, identify_one_shot, identify_springs
 from sea_ident.estimation.springs import hysteresis_column
 from sea_ident.exceptions import IdentificationError, RecordingError, RobotError, SeaIdentWarning
@@ -151,3 +152,10 @@ def test_a_negative_stiffness_is_warned_of(leg, truth):
     assert len(told) == 1
     assert "hip" in told[0]
     assert "--unknown-zero" in told[0]
+
+
+def test_a_hysteresis_wider_than_every_deflection_cannot_be_told(leg, truth):
+    """Before it slips it is stiffness and damping over again."""
+    effects = (*base_effects(leg), make_effect("spring_hysteresis", "hip", slip=1e3))
+    with pytest.raises(IdentificationError, match=r"joint 'hip': this motion does not .*spring_hysteresis"):
+        identify(leg, record(leg, truth, 4, **NOISE), effects=effects, period=10.0)
