@@ -62,11 +62,12 @@ class LinkFlexibility(SignalEffect):
         i = self.required_index(robot)
         linear, cubic = self._spring(robot)
         c, d = self.compliance, motion.deflection[:, i]
-        whole = d
+        whole, most = d, np.abs(d) / LEAST
         for _ in range(NEWTON_STEPS):
             slope = linear + 3.0 * cubic * whole**2
             step = (whole - d - c * (linear * whole + cubic * whole**3)) / np.maximum(1.0 - c * slope, LEAST)
-            whole = whole - step
+            # a compliance of more than the whole has no deflection; it must not run away in search of one
+            whole = np.clip(whole - step, -most, most)
         slope = linear + 3.0 * cubic * whole**2
         share = np.maximum(1.0 - c * slope, LEAST)
         rate = motion.deflection_rate[:, i] / share
