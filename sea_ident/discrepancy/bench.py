@@ -155,7 +155,8 @@ class Bench(Tangents):
             scale = self._link_scale(slopes @ values)
             whitened = whitening.scaled(left, scale)
             new_cost = float(whitened @ whitened)
-            if not new_cost <= cost * (1.0 + 1e-9):
+            gone = len(self._scaled_links(slopes @ values)) < len(self._scaled_links(slopes @ best))
+            if gone or not new_cost <= cost * (1.0 + 1e-9):
                 step = 0.3 * step
                 values = best + step
                 continue
@@ -172,6 +173,11 @@ class Bench(Tangents):
         """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
         first = self.first_stiffness
         return np.where(first > 0.0, first / np.maximum(stiffness, LEAST_STIFFNESS * first + 1e-300), 1.0)
+
+    def slack_links(self, fit: Fit) -> list[int]:
+        """Link equations of springs that have lost their stiffness in a fit: they explain nothing, at no price."""
+        tight = self._scaled_links(self.stiffness_of(fit))
+        return [e for e in self._deflections if self.first_stiffness[e] > 0.0 and e not in tight]
 
     def _scaled_links(self, stiffness: FloatArray) -> list[int]:
         """Link equations of which the scale follows the stiffness (E,)."""
@@ -344,7 +350,8 @@ class Bench(Tangents):
             ahead = fit.values + follow @ step
             start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
             new = self.fit(effects, noise, start=start, tangents=False)
-            if new.statistic < fit.statistic and not self._runs_away(fit, new):
+            slack = len(self.slack_links(new)) > len(self.slack_links(fit))
+            if new.statistic < fit.statistic and not slack and not self._runs_away(fit, new):
                 return new
             step = step / 3.0
         return None

@@ -22,7 +22,7 @@ from sea_ident.discrepancy.judge import (
 )
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, Shape
 from sea_ident.effects.signal import SignalEffect
 
 FAMILY_LEVEL = 1e-3
@@ -73,6 +73,12 @@ SLOW = 0.4
 LEAST_OF_A_SIGNAL = 0.02
 """Share of what it is to explain that a first step must promise of an effect in the chain of signals: it says little of
 one that is not small, but not nothing."""
+
+LARGE_AMOUNT = 0.1
+"""Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
+
+SMALLER = 0.1
+"""... with this part of it too [-]."""
 
 CHALLENGERS = 3
 """Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
@@ -168,6 +174,8 @@ def _next(
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
             continue
+        if len(bench.slack_links(new)) > len(bench.slack_links(fit)):
+            continue
         own = own_torque(bench, new, -1)
         hidden = own > LARGE_TORQUE and torque_change(bench, fit, new) < CANCELLED * own
         cancels = hidden and not is_signal(candidate.effect)
@@ -210,9 +218,17 @@ def refitted(
     if isinstance(effect, SignalEffect) and effect.beginnings:
         first = effect.amounts[0].name
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
+    if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
+        smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
+        begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
     fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
-    best = min(fits, key=lambda fit: fit.statistic)
+    best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     return with_sharp_edges(bench, best, noise, len(before))
+
+
+def _share(effect: SignalEffect, amount: Shape) -> float:
+    """Part of its range that an amount takes [-]."""
+    return abs(float(getattr(effect, amount.name))) / max(amount.upper - amount.lower, 1e-300)
 
 
 def of_every_kind(candidates: Sequence[Candidate], count: int, joint: str | None = None) -> list[Candidate]:
@@ -255,7 +271,10 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             better = best.statistic + penalty(best.effects[position], bench)
-            if new.statistic + penalty(candidate.effect, bench) < better - 1.0 and physical(bench, new, position):
+            slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
+            if slack or not physical(bench, new, position):
+                continue
+            if new.statistic + penalty(candidate.effect, bench) < better - 1.0:
                 best = new
         if best is not fit:
             now = settle_again(bench, best)
