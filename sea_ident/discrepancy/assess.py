@@ -22,6 +22,9 @@ from sea_ident.effects.signal import SignalEffect
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
 
+THE_SAME = 0.05
+"""Two effects between whose statistics there is less than this are one and the same on this motion."""
+
 LOOKS_ALIKE = 0.9
 """Share of one effect in the span of another from which on they are called confusable."""
 
@@ -45,6 +48,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         gain = reduced.statistic - fit.statistic
         unit = max(fit.statistic / max(fit.dof, 1), 1.0)
         alike: list[Alternative] = []
+        dearer: list[tuple[Alternative, float]] = []
+        scores: list[float] = []
         tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)]
         for candidate in of_every_kind(tried, RIVALS):
             if candidate.gain < 0.3 * gain:
@@ -53,10 +58,17 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if _slowest(new.effects[position]):
                 continue
-            if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit and physical(bench, new, position):
+            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
-                alike.append(Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new))
+                other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
+                if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit:
+                    alike.append(other)
+                    scores.append(new.statistic)
+                else:
+                    dearer.append((other, new.statistic))
+        # what this motion shows as exactly the same as one of them is as likely, however many parameters it has
+        alike.extend(other for other, own_score in dearer if any(abs(own_score - s) < THE_SAME for s in scores))
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
         found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
     return found

@@ -11,6 +11,7 @@ from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import NoiseFloor, step_freedom
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
+from sea_ident.effects.external_force import ExternalForce
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
@@ -82,6 +83,15 @@ def at_a_bound(effect: Effect) -> bool:
             if value < 1.02 * shape.lower or value > 0.98 * shape.upper:
                 return True
     return False
+
+
+def too_short(bench: Bench, effect: Effect) -> bool:
+    """Whether a push is shorter than what is compared can show: then it only stands in for something sudden."""
+    if not isinstance(effect, ExternalForce):
+        return False
+    period = bench.data.period
+    length = float(np.mod(effect.stop - effect.start, period)) + period / bench.data.samples
+    return length < period / (2.0 * bench.data.harmonics)
 
 
 def torque_change(bench: Bench, before: Fit, after: Fit) -> float:

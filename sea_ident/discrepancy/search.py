@@ -18,6 +18,7 @@ from sea_ident.discrepancy.judge import (
     physical,
     scatter_p,
     significance,
+    too_short,
     torque_change,
 )
 from sea_ident.discrepancy.noise import NoiseFloor
@@ -179,7 +180,9 @@ def _next(
         own = own_torque(bench, new, -1)
         hidden = own > LARGE_TORQUE and torque_change(bench, fit, new) < CANCELLED * own
         cancels = hidden and not is_signal(candidate.effect)
-        if visible_change(bench, fit, new) < smallest or cancels or at_a_bound(new.effects[-1]):
+        if visible_change(bench, fit, new) < smallest or cancels:
+            continue
+        if at_a_bound(new.effects[-1]) or too_short(bench, new.effects[-1]):
             continue
         if scatter_p(periods, fit.whitened - new.whitened) > SCATTER_LEVEL:
             continue
