@@ -9,7 +9,15 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, MissingParameter, Verdict, Waveforms
+from sea_ident.discrepancy.findings import (
+    Alternative,
+    Gap,
+    LackOfFit,
+    MissingEffect,
+    MissingParameter,
+    Verdict,
+    Waveforms,
+)
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import HeldOut
@@ -33,6 +41,15 @@ LARGEST_REMAINDER = 3e-3
 
 WORTH_A_NAME = 1e-2
 """Share of the torque from which on what is left would be an effect of its own [-]: then no other name explains it."""
+
+FAR_BEYOND = 3.0
+"""Times the noise from which on a gap on other data counts, ..."""
+
+GOES = 0.5
+"""... shrink of the gap on the recording itself from which on it should go there too [-], ..."""
+
+STAYS = 0.3
+"""... and share of that shrink below which it does not [-]."""
 
 UNEXPLAINED = 0.5
 """Share of the excess from which on the effects found are no explanation of it [-]."""
@@ -74,11 +91,12 @@ def conclude(
         missing.extend(change.missing)
     missing.sort(key=lambda m: -m.torque_share)
     unexplained = max(left - left_dof, 0.0) / max(statistic - dof, 1.0) if selection.added else 1.0
-    verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes)
-    if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
-        verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
+    holds = held_gap is None or explains(gap, held_gap)
+    verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
+    if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
+        verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
@@ -109,6 +127,12 @@ def unexplained(confirmed: Confirmed) -> bool:
     return remainder_share(confirmed.bench, confirmed.final) > LARGEST_REMAINDER
 
 
+def explains(training: Gap, held: Gap) -> bool:
+    """Whether a gap that goes on one recording goes on the other too, where it is far beyond the noise."""
+    left, noise = (float(np.linalg.norm(list(part.values()))) for part in (held.after, held.noise))
+    return left < FAR_BEYOND * noise or training.shrink < GOES or held.shrink > STAYS * training.shrink
+
+
 def verdict_of(
     bench: Bench,
     missing: list[MissingEffect],
@@ -117,6 +141,7 @@ def verdict_of(
     remainder: float,
     unexplained: float,
     notes: check.Findings,
+    holds: bool = True,
 ) -> Verdict:
     """The verdict.
 
@@ -128,6 +153,7 @@ def verdict_of(
         remainder: rms of what is left, as a share of the torque [-].
         unexplained: share of the excess that is left [-].
         notes: what is wrong with the data.
+        holds: whether what was found explains other data too, as far as can be told.
 
     Returns:
         The verdict.
@@ -142,7 +168,7 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
-    if any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
+    if not holds or any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL

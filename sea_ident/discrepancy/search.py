@@ -24,6 +24,7 @@ from sea_ident.discrepancy.judge import (
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect, Shape
+from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 
 FAMILY_LEVEL = 1e-3
@@ -49,6 +50,9 @@ CANCELLED = 0.02
 
 SCATTER_LEVEL = 1e-5
 """Probability that an effect must not exceed by the scatter of the periods along its own columns."""
+
+PUSHES_BACK = 0.2
+"""Share of a large push by which the torque must change without it: else it only cancels another [-]."""
 
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
@@ -296,7 +300,11 @@ def _eliminate(bench: Bench, now: Settled, added: list[float], tests: int) -> tu
             without = bench.refine(others, noise, start=fit.parameters, only=len(bench.effects))
             loss = without.statistic - fit.statistic
             columns = max(len(fit.effects[position].columns(bench.robot)), 1)
-            needed = torque_change(bench, fit, without) >= SMALLEST_SHARE
+            visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
+            needed = visible >= SMALLEST_SHARE
+            if isinstance(fit.effects[position], ExternalForce) and own > LARGE_TORQUE:
+                # a push comes and goes: nothing but another push can cancel it
+                needed = needed and visible > PUSHES_BACK * own
             p_value = significance(loss, columns, tests, without, noise) if needed else 1.0
             scores.append((p_value, position, without))
         worst = max(scores, key=lambda s: s[0])

@@ -9,8 +9,8 @@ import pytest
 import sea_ident
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
-from sea_ident.discrepancy.conclude import verdict_of
-from sea_ident.discrepancy.findings import Alternative, MissingEffect
+from sea_ident.discrepancy.conclude import explains, verdict_of
+from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries
@@ -108,8 +108,8 @@ def test_every_verdict_follows_from_findings():
     effect = MissingEffect("torque_ripple", "hip", (), 0.05, 1e-9, ())
     other = replace(effect, alternatives=(Alternative("torque_offset", "hip", 1.0),))
 
-    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False):
-        return verdict_of(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal))
+    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True):
+        return verdict_of(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal), holds)
 
     assert verdict([]) is Verdict.NONE
     assert verdict([effect]) is Verdict.NAMED
@@ -119,8 +119,26 @@ def test_every_verdict_follows_from_findings():
     assert verdict([effect], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
     assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
+    assert verdict([effect], holds=False) is Verdict.SUSPECT
     assert verdict([], remainder=0.01) is Verdict.NOT_IN_LIBRARY
     assert verdict([effect], fatal=True) is Verdict.CANNOT_TELL
+
+
+@pytest.mark.parametrize(
+    ("train", "held", "noise", "expected"),
+    [
+        ((1.0, 0.1), (2.0, 0.2), 0.1, True),  # goes on both
+        ((1.0, 0.1), (50.0, 49.0), 0.1, False),  # stays on the other, far beyond its noise
+        ((1.0, 0.1), (50.0, 80.0), 0.1, False),  # grows there
+        ((1.0, 0.1), (0.2, 0.2), 0.1, True),  # hardly more than noise there: nothing can be told
+        ((1.0, 0.9), (50.0, 49.0), 0.1, True),  # does not go on the recording itself either: a drift
+    ],
+)
+def test_what_is_found_must_explain_other_data_too(train, held, noise, expected):
+    gaps = [
+        Gap({"hip": b, "knee": 0.0}, {"hip": a, "knee": 0.0}, {"hip": noise, "knee": 0.0}) for b, a in (train, held)
+    ]
+    assert explains(*gaps) is expected
 
 
 # -- input that proves nothing
