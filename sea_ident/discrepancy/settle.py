@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
+from sea_ident.regressor import prior_parameters
 
 FAR = 3.0
 """Statistic over degrees of freedom beyond which the shapes of the model are left alone, for they would bend to the
@@ -38,6 +41,16 @@ def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
     settled = Settled(fit, bench.noise(fit))
     for _ in range(rounds):
         settled = settle_again(bench, settled.fit)
+    slack = bench.slack_links(settled.fit)
+    if slack:
+        # a model that lacks much may lose a spring from here, and keep it from where the description puts it
+        described = np.nan_to_num(prior_parameters(bench.robot, settled.fit.effects))
+        known = {c.name: float(v) for c, v in zip(fit.columns, described, strict=True)}
+        other = Settled(bench.fit(settled.fit.effects, settled.noise, start=known), settled.noise)
+        for _ in range(rounds):
+            other = settle_again(bench, other.fit)
+        if len(bench.slack_links(other.fit)) < len(slack):
+            return other
     return settled
 
 

@@ -1,0 +1,80 @@
+"""What a recording is compared by: how far the regressor reaches, and that a spring is not lost on the way."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.data import REGRESSOR_MARGIN, WIDEST_MARGIN
+from sea_ident.discrepancy.judge import too_short
+from sea_ident.discrepancy.search import refitted
+from sea_ident.discrepancy.settle import settle
+from sea_ident.effects import make_effect
+from sea_ident.simulation import FrictionJitter, SensorNoise
+
+
+def sensors(factor):
+    """The usual encoders, so many times as noisy, without steps; the torque too where they are better."""
+    usual = SensorNoise()
+    return SensorNoise(
+        link_position=factor * usual.link_position,
+        motor_position=factor * usual.motor_position,
+        link_resolution=0.0,
+        motor_resolution=0.0,
+        current=min(factor, 1.0) * usual.current,
+        motor_torque=min(factor, 1.0) * usual.motor_torque,
+    )
+
+
+def test_good_encoders_show_the_corner_of_friction(laboratory):
+    """With a tenth of the noise the model is still right: what the regressor cannot follow would stand out by then."""
+    recording = laboratory.record(periods=10, sensors=sensors(0.1), jitter=FrictionJitter(0.0, 0.05))
+    bench = laboratory.bench(recording)
+    assert bench.data.reach == int(WIDEST_MARGIN * bench.data.harmonics)
+    now = settle(bench, bench.effects)
+    assert now.fit.statistic / now.fit.dof == pytest.approx(1.0, abs=0.08)
+
+
+def test_bad_encoders_do_not_blur_the_sign_of_a_velocity(laboratory):
+    """The regressor reaches no further than it must; no more samples are left out than for good encoders."""
+    good, bad = (
+        laboratory.data(laboratory.record(periods=10, sensors=sensors(factor), jitter=FrictionJitter(0.0, 0.05)))
+        for factor in (0.1, 10.0)
+    )
+    assert bad.reach == int(REGRESSOR_MARGIN * bad.harmonics)
+    assert np.mean(bad.left_out) < np.mean(good.left_out) + 0.005
+
+
+@pytest.mark.parametrize(("joint", "sine", "cosine"), [("ankle", -0.0354, -0.0294), ("knee", 0.05, 0.05)])
+def test_a_large_error_of_an_encoder_does_not_cost_the_spring(laboratory, joint, sine, cosine):
+    """Its tangent is wrong by a factor of two to four, and a spring without stiffness would explain as much."""
+    shape = {"sine": sine, "cosine": cosine}
+    bench = laboratory.bench(laboratory.record([("encoder_eccentricity", joint, [], shape)], periods=10))
+    now = settle(bench, bench.effects)
+    assert bench.slack_links(now.fit) == []
+    tried = next(
+        c.effect
+        for c in scan(bench, now.fit, now.noise)
+        if (c.effect.name, c.effect.joint) == ("encoder_eccentricity", joint)
+    )
+    found = refitted(bench, now.fit.effects, tried, (), now.noise, now.fit.parameters)
+    assert bench.slack_links(found) == []
+    assert (found.effects[-1].sine, found.effects[-1].cosine) == pytest.approx((sine, cosine), abs=2e-4)
+    assert found.statistic < 1e-3 * now.fit.statistic
+
+
+def test_a_spring_without_stiffness_is_seen(nothing_missing):
+    bench, now = nothing_missing
+    assert bench.slack_links(now.fit) == []
+    gone = {**now.fit.parameters, "knee.spring_stiffness": 0.0, "knee.spring_stiffening": 0.0}
+    slack = bench.slack_links(bench.predicted(now.fit.effects, gone))
+    assert [(bench.data.equations[e].joint, str(bench.data.equations[e].kind)) for e in slack] == [("knee", "link")]
+
+
+@pytest.mark.parametrize(("stop", "expected"), [(1.005, True), (1.015, True), (1.03, False), (0.5, False)])
+def test_a_push_of_a_few_samples_is_none(nothing_missing, stop, expected):
+    """Compared are 20 Hz: half of a period of them is 25 ms."""
+    bench: Bench = nothing_missing[0]
+    push = make_effect("external_force", "knee", start=1.0, stop=stop, period=bench.data.period)
+    assert too_short(bench, push) is expected
+    assert not too_short(bench, make_effect("torque_offset", "knee"))
