@@ -23,7 +23,7 @@ from sea_ident.effects import (
 )
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
-from sea_ident.regressor import build_regressor, model_columns
+from sea_ident.regressor import build_regressor
 from tests.benchmarks.hidden_effects import catalogue, gap, sensors
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case
@@ -139,13 +139,13 @@ def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.En
     motion = sensed_motion(exact, seen) if entry.effect in gap.SENSOR_EFFECTS else exact.motion
     model = (*sum_model(truth), *spring_effects(robot))
     parameters = true_parameters(truth, model)
+    names = [column.name for effect in model for column in effect.columns(robot)]
+    # a model that does without the effect has the springs before the encoders
+    anchor = Anchor(robot, model, dict(zip(names, map(float, parameters), strict=True)))
     if entry.effect == "link_flexibility":  # the model's spring is the whole of both compliances
-        names = [column.name for effect in model for column in effect.columns(robot)]
         whole = 1.0 / (1.0 / truth.stiffness[joint] + planted.size)
         parameters[names.index(f"{name}.spring_stiffness")] = whole
         parameters[names.index(f"{name}.spring_stiffening")] *= (whole / truth.stiffness[joint]) ** 4
-    known = {c.name: float(v) for c, v in zip(model_columns(robot, model), parameters, strict=True)}
-    anchor = Anchor(robot, model, known)
     added = [
         (p.effect.anchored(anchor), p.values) for p in planted_effects(planted, truth, SMOOTHING, series.period, 1)
     ]

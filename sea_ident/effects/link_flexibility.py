@@ -25,13 +25,14 @@ class LinkFlexibility(SignalEffect):
     """The bodies stand at q - c tau_spring, where q is what the link encoder shows.
 
     The compliance bends without inertia of its own. The spring of the model is the whole of both compliances, between
-    motor and bodies: its deflection d solves d - c tau_spring(d) = theta - q.
+    motor and bodies: it is what tau_spring follows from in the description. With the law of the part before the
+    encoder, whose deflection is measured, tau_spring follows from that: it is what a model without this effect finds.
 
     Attributes:
         joint: joint at which it acts.
         compliance: c, behind the encoder [rad/(N m)].
-        stiffness: K1 of the whole spring, None for that of the description [N m/rad].
-        cubic_stiffness: K3 of it [N m/rad3].
+        stiffness: K1 of the part before the encoder, None to take the whole spring of the description [N m/rad].
+        cubic_stiffness: K3 of that part [N m/rad3].
     """
 
     compliance: float = 0.0
@@ -48,37 +49,50 @@ class LinkFlexibility(SignalEffect):
         return tuple(cls(joint=joint.name) for joint in robot.joints if joint.elastic)
 
     def anchored(self, anchor: Anchor) -> "LinkFlexibility":
-        """With the spring of the model."""
-        if self.stiffness is not None:
+        """With the spring of the model; the bodies stay where they are."""
+        linear = anchor.value(f"{self.joint}.spring_stiffness")
+        if self.stiffness is None:
+            return replace(self, stiffness=linear, cubic_stiffness=anchor.value(f"{self.joint}.spring_stiffening"))
+        before = self.stiffness
+        now = linear * (1.0 + self.compliance * before)  # the whole is softer by what bends behind the encoder
+        if not (before > 0.0 and now > 0.0):
             return self
+        ratio = now / before
         return replace(
             self,
-            stiffness=anchor.value(f"{self.joint}.spring_stiffness"),
-            cubic_stiffness=anchor.value(f"{self.joint}.spring_stiffening"),
+            compliance=self.compliance / ratio,
+            stiffness=now,
+            cubic_stiffness=ratio * (self.cubic_stiffness or 0.0),
         )
 
     def corrected(self, robot: Robot, motion: Motion) -> Motion:
         """Q of the bodies."""
         i = self.required_index(robot)
-        linear, cubic = self._spring(robot)
-        c, d = self.compliance, motion.deflection[:, i]
-        whole, most = d, np.abs(d) / LEAST
-        for _ in range(NEWTON_STEPS):
-            slope = linear + 3.0 * cubic * whole**2
-            step = (whole - d - c * (linear * whole + cubic * whole**3)) / np.maximum(1.0 - c * slope, LEAST)
-            # a compliance of more than the whole has no deflection; it must not run away in search of one
-            whole = np.clip(whole - step, -most, most)
-        slope = linear + 3.0 * cubic * whole**2
-        share = np.maximum(1.0 - c * slope, LEAST)
-        rate = motion.deflection_rate[:, i] / share
-        bend = motion.ddtheta[:, i] - motion.ddq[:, i] + c * 6.0 * cubic * whole * rate**2
+        d, c = motion.deflection[:, i], self.compliance
+        rate, bend = motion.deflection_rate[:, i], motion.ddtheta[:, i] - motion.ddq[:, i]
+        if self.stiffness is not None:
+            linear, cubic = self.stiffness, self.cubic_stiffness or 0.0
+            whole = d + c * (linear * d + cubic * d**3)
+            share = 1.0 + c * (linear + 3.0 * cubic * d**2)
+            whole_rate, whole_bend = share * rate, share * bend + c * 6.0 * cubic * d * rate**2
+        else:
+            linear, cubic = self._whole_spring(robot)
+            whole, most = d, np.abs(d) / LEAST
+            for _ in range(NEWTON_STEPS):
+                slope = linear + 3.0 * cubic * whole**2
+                step = (whole - d - c * (linear * whole + cubic * whole**3)) / np.maximum(1.0 - c * slope, LEAST)
+                # a compliance of more than the whole has no deflection; it must not run away in search of one
+                whole = np.clip(whole - step, -most, most)
+            share = np.maximum(1.0 - c * (linear + 3.0 * cubic * whole**2), LEAST)
+            whole_rate = rate / share
+            whole_bend = (bend + c * 6.0 * cubic * whole * whole_rate**2) / share
         return with_joint(
             robot,
             motion,
             i,
             motion.theta[:, i] - whole,
-            motion.dtheta[:, i] - rate,
-            motion.ddtheta[:, i] - bend / share,
+            motion.dtheta[:, i] - whole_rate,
+            motion.ddtheta[:, i] - whole_bend,
         )
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
@@ -95,13 +109,11 @@ class LinkFlexibility(SignalEffect):
         out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]
         return out
 
-    def _spring(self, robot: Robot) -> tuple[float, float]:
+    def _whole_spring(self, robot: Robot) -> tuple[float, float]:
         spring = robot.spring(str(self.joint))
-        linear = self.stiffness if self.stiffness is not None else spring.stiffness
-        if linear is None:
+        if spring.stiffness is None:
             raise EffectError(
                 f"the effect {self.name!r} at {self.joint!r} needs the stiffness of its spring: give stiffness=..., "
                 "or put it into the annotation"
             )
-        cubic = self.cubic_stiffness if self.cubic_stiffness is not None else spring.cubic_stiffness
-        return linear, cubic or 0.0
+        return spring.stiffness, spring.cubic_stiffness or 0.0

@@ -8,7 +8,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import REGRESSOR_MARGIN, WIDEST_MARGIN
 from sea_ident.discrepancy.judge import too_short
 from sea_ident.discrepancy.search import refitted
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SensorNoise
 
@@ -78,3 +78,21 @@ def test_a_push_of_a_few_samples_is_none(nothing_missing, stop, expected):
     push = make_effect("external_force", "knee", start=1.0, stop=stop, period=bench.data.period)
     assert too_short(bench, push) is expected
     assert not too_short(bench, make_effect("torque_offset", "knee"))
+
+
+@pytest.mark.parametrize(("compliance", "within"), [(0.0005, 0.02), (0.0025, 0.05)])
+def test_how_far_a_link_bends(laboratory, compliance, within):
+    """Half of the whole compliance behind the encoder, and the spring that is found without the effect is another."""
+    shape = {"compliance": compliance}
+    bench = laboratory.bench(laboratory.record([("link_flexibility", "knee", [], shape)], periods=10))
+    now = settle(bench, bench.effects)
+    tried = next(
+        c.effect
+        for c in scan(bench, now.fit, now.noise)
+        if (c.effect.name, c.effect.joint) == ("link_flexibility", "knee")
+    )
+    found = refitted(bench, now.fit.effects, tried, (), now.noise, now.fit.parameters)
+    again = settle_again(bench, found).fit
+    assert again.effects[-1].compliance == pytest.approx(compliance, rel=within)
+    # in the model, the spring is what lies between motor and bodies
+    assert again.parameters["knee.spring_stiffness"] == pytest.approx(200.0, rel=0.02)
