@@ -12,15 +12,12 @@ from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import penalty, physical, significance
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
-
-EQUALLY_GOOD = 13.8
-"""Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
 
 THE_SAME = 0.05
 """Two effects between whose statistics there is less than this are one and the same on this motion."""
@@ -56,7 +53,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
-            if _slowest(new.effects[position]):
+            if slowest(new.effects[position]):
                 continue
             if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
@@ -72,11 +69,6 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
         found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
     return found
-
-
-def _slowest(effect: Effect) -> bool:
-    """Whether a wave along a path ended as the longest that there is: then it only stands in for a constant."""
-    return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.shapes)
 
 
 def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from sea_ident.discrepancy.assess import EQUALLY_GOOD, Transfer
+from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import HeldOut, tried
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 

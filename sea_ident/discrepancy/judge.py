@@ -16,6 +16,9 @@ from sea_ident.effects.external_force import ExternalForce
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
 
+EQUALLY_GOOD = 13.8
+"""Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
+
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
 
@@ -94,16 +97,30 @@ def too_short(bench: Bench, effect: Effect) -> bool:
     return length < period / (2.0 * bench.data.harmonics)
 
 
-def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
-    """Largest change of the residual of any equation, as a share of the rms torque that it is about [-]."""
+def torque_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
+    """(E,) change of the residual of every equation, as a share of the rms torque that it is about [-]."""
     change = np.sqrt(np.sum(np.abs(after.residual - before.residual) ** 2, axis=0))
-    return float(np.max(change / np.maximum(bench.torque_rms, 1e-300)))
+    return np.asarray(change / np.maximum(bench.torque_rms, 1e-300), dtype=np.float64)
+
+
+def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
+    """The largest of `torque_changes`."""
+    return float(np.max(torque_changes(bench, before, after)))
 
 
 def penalty(effect: Effect, bench: Bench) -> float:
-    """Price of the parameters of an effect in units of the statistic, so that the simpler of two equals wins."""
+    """Price of the parameters of an effect in units of the statistic, so that the simpler of two equals wins.
+
+    A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one.
+    """
     count = len(effect.columns(bench.robot)) + len(free_shapes((effect,)))
-    return count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
+    price = count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
+    return price + (EQUALLY_GOOD if slowest(effect) else 0.0)
+
+
+def slowest(effect: Effect) -> bool:
+    """Whether a wave along a path ended as the longest that there is: then it only stands in for a constant."""
+    return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.shapes)
 
 
 def physical(bench: Bench, fit: Fit, position: int) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.edges import with_sharp_edges
@@ -18,8 +19,10 @@ from sea_ident.discrepancy.judge import (
     physical,
     scatter_p,
     significance,
+    slowest,
     too_short,
     torque_change,
+    torque_changes,
 )
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -40,7 +43,7 @@ SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
 BESIDE_ANOTHER = 0.12
-"""And by this share of what the largest effect beside it does: the form of that one is never known better."""
+"""And by this share of what another effect does to the same equation: the form of that one is never known better."""
 
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
@@ -129,17 +132,17 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
     start = settle(bench, effects)
     now = start
     added: list[float] = []
-    largest = 0.0
+    largest = np.zeros(len(bench.data.equations))
     while True:
         candidates = scan(bench, now.fit, now.noise)
         tests = max(sum(c.tests for c in candidates), 1)
         if len(added) >= MOST_EFFECTS:
             break
-        step = _next(bench, now, candidates, tests, max(SMALLEST_SHARE, BESIDE_ANOTHER * largest))
+        step = _next(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest))
         if step is None:
             break
         new, p_value = step
-        largest = max(largest, visible_change(bench, now.fit, new))
+        largest = np.maximum(largest, visible_changes(bench, now.fit, new))
         added.append(p_value)
         last = now
         now = settle_again(bench, new)
@@ -161,9 +164,12 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
 
 
 def _next(
-    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: float
+    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray
 ) -> tuple[Fit, float] | None:
-    """The best candidate refitted with everything free and its significance, None where none is worth it."""
+    """The best candidate refitted with everything free and its significance, None where none is worth it.
+
+    Of a candidate at least one equation must change by what is `smallest` (E,) there, as a share of the torque.
+    """
     fit, noise = now.fit, now.noise
     worth = [
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
@@ -184,7 +190,7 @@ def _next(
         own = own_torque(bench, new, -1)
         hidden = own > LARGE_TORQUE and torque_change(bench, fit, new) < CANCELLED * own
         cancels = hidden and not is_signal(candidate.effect)
-        if visible_change(bench, fit, new) < smallest or cancels:
+        if np.all(visible_changes(bench, fit, new) < smallest) or cancels:
             continue
         if at_a_bound(new.effects[-1]) or too_short(bench, new.effects[-1]):
             continue
@@ -204,12 +210,12 @@ def _next(
     return None if best is None else (best[1], best[2])
 
 
-def visible_change(bench: Bench, before: Fit, after: Fit) -> float:
-    """Largest change by the last effect of a fit in any equation, as a share of the torque there [-].
+def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
+    """(E,) change by the last effect of a fit in every equation, as a share of the torque there [-].
 
     Where the model bent to do without it, the change is larger than the effect and says nothing of its size.
     """
-    return min(torque_change(bench, before, after), 2.0 * own_torque(bench, after, -1))
+    return np.minimum(torque_changes(bench, before, after), 2.0 * own_torque(bench, after, -1))
 
 
 def refitted(
@@ -265,8 +271,8 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
     first = len(now.fit.effects) - added
     for position in range(first, first + added):
         fit, noise = now.fit, now.noise
-        if fit.statistic < RIGHT * fit.dof:
-            break
+        if fit.statistic < RIGHT * fit.dof and not slowest(fit.effects[position]):
+            continue
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         own = effect_key(fit.effects[position])
