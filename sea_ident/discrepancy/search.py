@@ -183,18 +183,7 @@ def _next(
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
-        if p_value > FAMILY_LEVEL or gain < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
-            continue
-        if len(bench.slack_links(new)) > len(bench.slack_links(fit)):
-            continue
-        own = own_torque(bench, new, -1)
-        hidden = own > LARGE_TORQUE and torque_change(bench, fit, new) < CANCELLED * own
-        cancels = hidden and not is_signal(candidate.effect)
-        if np.all(visible_changes(bench, fit, new) < smallest) or cancels:
-            continue
-        if at_a_bound(new.effects[-1]) or too_short(bench, new.effects[-1]):
-            continue
-        if scatter_p(periods, fit.whitened - new.whitened) > SCATTER_LEVEL:
+        if p_value > FAMILY_LEVEL or not _acceptable(bench, fit, new, periods, smallest):
             continue
         accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
         most = max(most, gain)
@@ -208,6 +197,29 @@ def _next(
         if best is None or score < best[0]:
             best = (score, new, p_value)
     return None if best is None else (best[1], best[2])
+
+
+def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest: FloatArray) -> bool:
+    """Whether the last effect of a new fit explains enough, could be, and is neither hidden nor a matter of one pass.
+
+    Args:
+        bench: the recording.
+        fit: without the effect.
+        new: with it.
+        periods: (P, M) whitened residuals of the periods without it.
+        smallest: (E,) change of the torque that matters, as a share of it [-].
+    """
+    effect = new.effects[-1]
+    if fit.statistic - new.statistic < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
+        return False
+    if len(bench.slack_links(new)) > len(bench.slack_links(fit)) or at_a_bound(effect) or too_short(bench, effect):
+        return False
+    own = own_torque(bench, new, -1)
+    if own > LARGE_TORQUE and not is_signal(effect) and torque_change(bench, fit, new) < CANCELLED * own:
+        return False
+    if np.all(visible_changes(bench, fit, new) < smallest):
+        return False
+    return scatter_p(periods, fit.whitened - new.whitened) <= SCATTER_LEVEL
 
 
 def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:

@@ -1,0 +1,55 @@
+"""What the search adds to a model: small effects beside large ones, and the simpler of two that say the same."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
+from sea_ident.discrepancy.search import BESIDE_ANOTHER, search, visible_changes
+from sea_ident.effects import make_effect
+
+
+def named(selection):
+    return {(effect.name, effect.joint) for effect in selection.effects}
+
+
+@pytest.fixture(scope="module")
+def unequal(laboratory):
+    """A large offset at the knee, and at the hip a Stribeck effect that is small beside it."""
+    planted = [
+        ("torque_offset", "knee", [-2.0], {}),
+        ("stribeck_friction", "hip", [2.0], {"speed": 0.1, "exponent": 2.0}),
+    ]
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    return bench, search(bench, bench.effects)
+
+
+def test_a_small_effect_at_another_joint_is_found_beside_a_large_one(unequal):
+    found = unequal[1]
+    assert named(found) == {("torque_offset", "knee"), ("stribeck_friction", "hip")}
+    offset = next(k for k, c in enumerate(found.final.fit.columns) if c.name == "knee.torque_offset")
+    assert found.final.fit.values[offset] == pytest.approx(-2.0, abs=4.0 * found.final.fit.std(offset))
+
+
+def test_the_small_one_would_not_count_at_the_joint_of_the_large_one(unequal):
+    """What it changes is less than the share of the large one that counts as never known better, but elsewhere."""
+    bench, found = unequal
+    fit, noise = found.final.fit, found.final.noise
+    changes = {}
+    for effect in found.effects:
+        others = [e for e in fit.effects if e is not effect]
+        without = bench.fit(others, noise, start=fit.parameters)
+        changes[effect.joint] = visible_changes(
+            bench, without, bench.fit([*others, effect], noise, start=fit.parameters)
+        )
+    assert np.max(changes["hip"]) < BESIDE_ANOTHER * np.max(changes["knee"])
+    assert np.any(changes["hip"] > BESIDE_ANOTHER * changes["knee"])
+
+
+def test_the_longest_wave_costs_more_than_a_constant(nothing_missing):
+    bench = nothing_missing[0]
+    order = next(s for s in make_effect("torque_ripple", "hip").shapes if s.name == "order")
+    longest, shorter = (make_effect("torque_ripple", "hip", order=factor * order.lower) for factor in (1.0, 2.0))
+    assert slowest(longest)
+    assert not slowest(shorter)
+    assert penalty(longest, bench) == pytest.approx(penalty(shorter, bench) + EQUALLY_GOOD)
+    assert penalty(make_effect("torque_offset", "hip"), bench) < penalty(shorter, bench)
