@@ -71,7 +71,7 @@ class Diagnosis:
         for m in self.missing:
             where = f" at {m.joint}" if m.joint else ""
             chance = f"{m.p_value:.1e}" if m.p_value > 1e-300 else "< 1e-300"
-            lines.append(f"  missing: {m.effect}{where}, {100 * m.torque_share:.2g} % of torque, p {chance}")
+            lines.append(f"  missing: {m.effect}{where}, {m.extent}, p {chance}")
             lines.extend(f"    {p.name} {p.value:.4g} +- {p.std:.2g} {p.unit}" for p in m.parameters)
             if m.alternatives:
                 others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)

@@ -10,6 +10,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Effect
+from sea_ident.effects.signal import SignalEffect
 
 
 class Verdict(StrEnum):
@@ -125,6 +126,13 @@ class MissingEffect:
     transfer: float | None = None
     detail: Effect | None = None
     values: tuple[float, ...] = ()
+
+    @property
+    def extent(self) -> str:
+        """How much there is of it: its amounts where it acts on what is measured, the torque of all others."""
+        if isinstance(self.detail, SignalEffect) and self.parameters:
+            return ", ".join(f"{p.value:.2g} {p.unit}" for p in self.parameters)
+        return f"{100 * self.torque_share:.2g} % of torque"
 
 
 @dataclass(frozen=True)

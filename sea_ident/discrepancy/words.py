@@ -120,19 +120,20 @@ def _name(m: MissingEffect) -> str:
 
 
 def _opening(facts: Facts) -> str:
-    names = ", ".join(f"{_name(m)} ({100 * m.torque_share:.2g} % of torque)" for m in facts.missing)
+    names = ", ".join(f"{_name(m)} ({m.extent})" for m in facts.missing)
     match facts.verdict:
         case Verdict.NONE:
             return f"Nothing is missing that {facts.periods} periods could show (lack of fit p = {facts.p_value:.2g})."
         case Verdict.NAMED | Verdict.NAMED_WITH_REMAINDER:
             return f"The model lacks {names}."
         case Verdict.AMBIGUOUS:
-            others = "; ".join(
-                f"{_name(m)} or {', '.join(f'{a.effect} at {a.joint}' for a in m.alternatives)}"
+            alike = "; nor ".join(
+                f"{', '.join([_name(m), *(f'{a.effect} at {a.joint}' for a in m.alternatives[:-1])])} from "
+                f"{m.alternatives[-1].effect} at {m.alternatives[-1].joint}"
                 for m in facts.missing
                 if m.alternatives
             )
-            return f"The model lacks {names}; this motion does not tell {others} apart."
+            return f"The model lacks {names}; this motion does not tell {alike}."
         case Verdict.SUSPECT:
             return f"Something is missing; it looks like {names}, but that does not hold on other data."
         case Verdict.NOT_IN_LIBRARY:

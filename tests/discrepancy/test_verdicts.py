@@ -10,7 +10,7 @@ import sea_ident
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import explains, verdict_of
-from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect
+from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, MissingParameter
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries
@@ -139,6 +139,16 @@ def test_what_is_found_must_explain_other_data_too(train, held, noise, expected)
         Gap({"hip": b, "knee": 0.0}, {"hip": a, "knee": 0.0}, {"hip": noise, "knee": 0.0}) for b, a in (train, held)
     ]
     assert explains(*gaps) is expected
+
+
+def test_an_error_of_an_encoder_is_said_in_its_own_unit():
+    """What it does to the torque is mostly taken up by the spring, and can be many times the torque."""
+    shift = MissingParameter("knee.encoder_offset_offset", -0.0026, 1e-5, "rad")
+    offset = MissingEffect(
+        "encoder_offset", "knee", (shift,), 4.1, 0.0, (), detail=make_effect("encoder_offset", "knee")
+    )
+    assert offset.extent == "-0.0026 rad"
+    assert MissingEffect("torque_offset", "knee", (shift,), 0.041, 0.0, ()).extent == "4.1 % of torque"
 
 
 # -- input that proves nothing

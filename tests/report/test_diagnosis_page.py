@@ -108,7 +108,7 @@ def test_the_page_says_verdict_gap_effect_and_alternatives(diagnosis, tmp_path):
     assert "only 12 periods" in text
     assert "stribeck friction at the knee" in text
     assert "knee.stribeck_friction_speed 0.3 0.01 rad/s" in text
-    assert "carries 3.7 % of the torque" in text
+    assert "size is 3.7 % of torque" in text
     assert "explain 97 %" in text
     assert "nonlinear_viscous_friction at knee (overlap 0.93)" in text
     # held out: 1 - 0.06 / 0.3
