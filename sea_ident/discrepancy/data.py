@@ -90,6 +90,7 @@ class PeriodData:
         left_out: (N, E) samples of an equation that say nothing about a model.
         warnings: what a user should know.
         caution: how many times the usual is left out around reversals.
+        known: (N, E) torque that is known to act beside the model, None where there is none [N m].
     """
 
     robot: Robot
@@ -106,6 +107,7 @@ class PeriodData:
     left_out: NDArray[np.bool_]
     warnings: tuple[str, ...] = ()
     caution: int = 1
+    known: FloatArray | None = None
 
     @property
     def periods(self) -> int:
@@ -122,11 +124,13 @@ class PeriodData:
         return equation_rows(self.equations, part)
 
     def target(self, tau_motor: FloatArray) -> FloatArray:
-        """(N, E) what the rows must sum up to: the motor torque, and zero in a link equation."""
+        """(N, E) what the rows must sum up to: the motor torque, and zero in a link equation, less what is known."""
         out = np.zeros((len(tau_motor), len(self.equations)))
+        if self.known is not None:
+            out -= self.known
         for e, equation in enumerate(self.equations):
             if equation.kind is not EquationKind.LINK:
-                out[:, e] = tau_motor[:, equation.index]
+                out[:, e] += tau_motor[:, equation.index]
         return out
 
 

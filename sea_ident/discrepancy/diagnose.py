@@ -2,8 +2,9 @@
 
 import warnings as python_warnings
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
@@ -15,6 +16,7 @@ from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
 from sea_ident.discrepancy.next_experiment import with_next_experiment
@@ -22,7 +24,7 @@ from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import TrendTest, compare_periods
+from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.estimation import Model
@@ -96,21 +98,12 @@ def diagnose(
     tell("searching", 0.1)
     basic = completed(bench)
     if basic is not None:
-        selection = basic.selection
+        found = _compared(bench, confirm(bench, basic.selection), temperature)
     elif data.periods < FEWEST_TO_SEARCH:
-        selection = _unsearched(bench)
+        found = _compared(bench, confirm(bench, _unsearched(bench)), temperature)
     else:
-        selection = search(bench, bench.effects)
-    confirmed = confirm(bench, selection)
-    slow_notes: tuple[str, ...] = ()
-    if basic is None and data.periods >= FEWEST_TO_SEARCH and unexplained(confirmed):
-        tell("searching without what is slow", 0.35)
-        second = without_the_slow(bench, confirmed)
-        if second is not None:
-            bench, confirmed = second.bench, second
-            slow_notes = (words.slow_samples(bench.data),)
-    tell("comparing the periods", 0.5)
-    trends = compare_periods(confirmed.bench, confirmed.final.fit, confirmed.final.noise, temperature)
+        found = _searched(bench, temperature, tell)
+    bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
     alternatives = assess.rivals(bench, confirmed.selection) if basic is None else {}
     tell("testing on held-out data", 0.75)
@@ -121,7 +114,7 @@ def diagnose(
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    notes = replace(notes, warnings=(*notes.warnings, *slow_notes, *basic_notes, *held_notes, *forward.notes))
+    notes = replace(notes, warnings=(*notes.warnings, *found.notes, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes)
     diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
@@ -132,6 +125,55 @@ def diagnose(
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return diagnosis
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What the mean of the periods and their comparison show, on which bench, and what a user should know of it."""
+
+    bench: Bench
+    confirmed: Confirmed
+    trends: TrendTest
+    notes: tuple[str, ...] = ()
+
+
+def _compared(
+    bench: Bench, confirmed: Confirmed, temperature: FloatArray | None, notes: tuple[str, ...] = ()
+) -> _Found:
+    final = confirmed.final
+    return _Found(bench, confirmed, compare_periods(confirmed.bench, final.fit, final.noise, temperature), notes)
+
+
+def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
+    """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
+    start = settle(bench, bench.effects)
+    before = compare_periods(bench, start.fit, start.noise, temperature)
+    found = _searched_mean(_less(bench, start.fit, before), temperature, tell)
+    if _names(found.trends) == _names(before):
+        return found
+    return _searched_mean(_less(bench, found.confirmed.final.fit, found.trends), temperature, tell)
+
+
+def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
+    confirmed = confirm(bench, search(bench, bench.effects))
+    notes: tuple[str, ...] = ()
+    if unexplained(confirmed):
+        tell("searching without what is slow", 0.35)
+        second = without_the_slow(bench, confirmed)
+        if second is not None:
+            bench, confirmed, notes = second.bench, second, (words.slow_samples(second.bench.data),)
+    tell("comparing the periods", 0.5)
+    return _compared(bench, confirmed, temperature, notes)
+
+
+def _less(bench: Bench, fit: Fit, trends: TrendTest) -> Bench:
+    if not trends.trends:
+        return bench
+    return Bench(replace(bench.data, known=within_periods(bench, fit, trends.trends)), bench.effects)
+
+
+def _names(trends: TrendTest) -> set[tuple[str, str | None]]:
+    return {(trend.effect.name, trend.effect.joint) for trend in trends.trends}
 
 
 def _tested(

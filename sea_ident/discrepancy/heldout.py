@@ -3,6 +3,8 @@
 import warnings as python_warnings
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from sea_ident.discrepancy import assess, check
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
@@ -13,6 +15,9 @@ from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
+
+ALIKE = 0.1
+"""Part of the motion of a motor by which its periods may differ [-]."""
 
 FEWEST_TO_SPLIT = 6
 """Periods from which on half of them are held out where no other motion is given."""
@@ -68,6 +73,10 @@ def held_out(
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         processed = wide_processing(holdout, bench.robot, None)
+        if processed.period is None and bench.data.period <= 0.5 * processed.interval * processed.samples:
+            # what drifts is found by no search for a period, but other motions mostly have the same
+            again = wide_processing(holdout, bench.robot, bench.data.period)
+            processed = again if _repeats(again) else processed
     if processed.period is None or processed.periods < 2:
         return other_periods(bench, selection), (
             f"the held-out recording {processed.source} holds less than two periods of a motion: nothing can be tested "
@@ -82,6 +91,16 @@ def held_out(
         data = away_from_reversals(data, bench.data.caution)
     found = tried(Bench(data, bench.effects), selection, processed.source)
     return replace(found, processed=processed, recording=holdout), tuple(warnings)
+
+
+def _repeats(processed: ProcessedRecording) -> bool:
+    """Whether the periods of a recording are those of one motion."""
+    motions = processed.period_motions
+    if len(motions) < 2:
+        return False
+    theta = np.stack([motion.theta for motion in motions])
+    range_of, apart = np.std(np.mean(theta, axis=0), axis=0), np.std(theta - np.mean(theta, axis=0), axis=(0, 1))
+    return bool(np.all(apart < ALIKE * range_of))
 
 
 def other_periods(bench: Bench, selection: Selection) -> HeldOut | None:

@@ -1,5 +1,6 @@
 """What changes from period to period, and is invisible in the mean."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -158,6 +159,32 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
+def within_periods(bench: Bench, fit: Fit, trends: Sequence[Trend]) -> FloatArray:
+    """Torque of trends in the mean period, beyond what they do to all of its phases alike.
+
+    What drifts from period to period drifts within a period too: its end comes later than its beginning, every time.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        trends: of its periods.
+
+    Returns:
+        (N, E) torque [N m].
+    """
+    data, state = bench.data, bench.state(fit.effects)
+    phase = (np.arange(data.samples) + 0.5) / data.samples
+    time = (np.arange(data.periods)[:, None] + phase) * data.period
+    total = np.zeros((data.samples, len(data.equations)))
+    for trend in trends:
+        if not isinstance(trend.effect, TrendEffect):
+            continue
+        change = trend.effect.change(time.ravel(), None).reshape(time.shape)
+        course = np.mean(change - np.mean(change, axis=1, keepdims=True), axis=0)
+        total += course[:, None] * (data.rows(trend.effect.steady(state)) @ trend.values)
+    return total
+
+
 def trend_effects(bench: Bench) -> list[Effect]:
     """Every trend of the library at every joint."""
     found: list[Effect] = []
@@ -214,7 +241,7 @@ def _time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...
     if not any(shape.name == "time_constant" for shape in getattr(effect, "shapes", ())):
         return (getattr(effect, "time_constant", 0.0),)
     length = float(middle[-1] + middle[0])
-    return tuple(float(c) for c in (0.1 * length, 0.2 * length, 0.4 * length, 0.8 * length, 20.0 * length))
+    return tuple(float(c) for c in (*np.geomspace(0.1 * length, 0.8 * length, 13), 20.0 * length))
 
 
 def _gain(flat: FloatArray, direction: _Direction) -> float:

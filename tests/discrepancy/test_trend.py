@@ -1,10 +1,22 @@
 """Trends: seen with their value where they are, and rarely by chance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import _Direction, _explained, _gain, _omnibus, _scatter_p, _values, compare_periods
+from sea_ident.discrepancy.trend import (
+    _Direction,
+    _explained,
+    _gain,
+    _omnibus,
+    _scatter_p,
+    _values,
+    compare_periods,
+    within_periods,
+)
 from sea_ident.effects import make_effect
 from sea_ident.recordings import Recording
 
@@ -130,3 +142,22 @@ def test_a_part_of_the_periods_has_a_profile_without_mean():
     later = direction(np.random.default_rng(16), 8, 20).over(slice(1, None))
     assert len(later.profile) == 7
     assert abs(later.profile.sum()) < 1e-12
+
+
+def test_a_drift_within_a_period_is_no_effect_of_its_own(laboratory):
+    """Stiffness that falls all the time is lower at the end of every period: that alone lies far beyond the noise."""
+    bench = laboratory.bench(laboratory.record([("stiffness_drift", "hip", [-150.0], {})], periods=12))
+    now = settle(bench, bench.effects)
+    trends = compare_periods(bench, now.fit, now.noise).trends
+    assert [(t.effect.name, t.effect.joint) for t in trends] == [("stiffness_drift", "hip")]
+    known = within_periods(bench, now.fit, trends)
+    less = Bench(replace(bench.data, known=known), bench.effects)
+    then = settle(less, less.effects)
+    assert now.fit.statistic > 2.0 * now.fit.dof
+    assert then.fit.statistic / then.fit.dof == pytest.approx(1.0, abs=0.2)
+    # a saw on the spring torque of the hip, opposite in its two equations, nothing elsewhere
+    deflection = bench.data.motion.deflection[:, 0]
+    saw = (np.arange(len(deflection)) + 0.5) / len(deflection) - 0.5
+    np.testing.assert_allclose(known[:, 0], -150.0 * bench.data.period / 60.0 * saw * deflection, rtol=0.1, atol=2e-3)
+    np.testing.assert_allclose(known[:, 1], -known[:, 0])
+    np.testing.assert_array_equal(known[:, 2:], 0.0)
