@@ -13,7 +13,7 @@ from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.regressor import build_regressor, inverse_dynamics, prior_parameters
 from sea_ident.robot import Robot, robot_from_text
 
-AXES = ("1 0 0", "0 1 0", "0 0 1", "0.6 0 0.8", "-0.3 0.9 0.1")
+AXES = ("1 0 0", "0 1 0", "0 0 1", "0.6 0 0.8", "-0.48 0.6 0.64")
 POSES = ("0 0 0", "0.1 0.2 -0.3", "1.5707963 0 0", "0 -2.1 0.4")
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="50"/>'
 

@@ -148,10 +148,10 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
     start = settle(bench, bench.effects)
     before = compare_periods(bench, start.fit, start.noise, temperature)
-    found = _searched_mean(_less(bench, start.fit, before), temperature, tell)
+    found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
     if _names(found.trends) == _names(before):
         return found
-    return _searched_mean(_less(bench, found.confirmed.final.fit, found.trends), temperature, tell)
+    return _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
 
 
 def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
@@ -166,10 +166,10 @@ def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress)
     return _compared(bench, confirmed, temperature, notes)
 
 
-def _less(bench: Bench, fit: Fit, trends: TrendTest) -> Bench:
+def _less(bench: Bench, fit: Fit, trends: TrendTest, temperature: FloatArray | None) -> Bench:
     if not trends.trends:
         return bench
-    return Bench(replace(bench.data, known=within_periods(bench, fit, trends.trends)), bench.effects)
+    return Bench(replace(bench.data, known=within_periods(bench, fit, trends.trends, temperature)), bench.effects)
 
 
 def _names(trends: TrendTest) -> set[tuple[str, str | None]]:

@@ -246,6 +246,7 @@ def _data_of(data: PeriodData, robot: Robot, series: FourierSeries, motors: Pred
         period_tau_motor=np.zeros((0, *motion.q.shape)),
         channels={},
         left_out=around_reversals(motion, data.equations),
+        known=None,
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
+from scipy.interpolate import interp1d
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
@@ -159,7 +160,9 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
-def within_periods(bench: Bench, fit: Fit, trends: Sequence[Trend]) -> FloatArray:
+def within_periods(
+    bench: Bench, fit: Fit, trends: Sequence[Trend], temperature: FloatArray | None = None
+) -> FloatArray:
     """Torque of trends in the mean period, beyond what they do to all of its phases alike.
 
     What drifts from period to period drifts within a period too: its end comes later than its beginning, every time.
@@ -168,6 +171,7 @@ def within_periods(bench: Bench, fit: Fit, trends: Sequence[Trend]) -> FloatArra
         bench: the recording.
         fit: the model.
         trends: of its periods.
+        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
 
     Returns:
         (N, E) torque [N m].
@@ -179,7 +183,12 @@ def within_periods(bench: Bench, fit: Fit, trends: Sequence[Trend]) -> FloatArra
     for trend in trends:
         if not isinstance(trend.effect, TrendEffect):
             continue
-        change = trend.effect.change(time.ravel(), None).reshape(time.shape)
+        own = None
+        if temperature is not None and trend.effect.joint is not None:
+            middle = (np.arange(data.periods) + 0.5) * data.period
+            each = temperature[:, bench.robot.index(trend.effect.joint)]
+            own = interp1d(middle, each, fill_value="extrapolate")(time.ravel())
+        change = trend.effect.change(time.ravel(), own).reshape(time.shape)
         course = np.mean(change - np.mean(change, axis=1, keepdims=True), axis=0)
         total += course[:, None] * (data.rows(trend.effect.steady(state)) @ trend.values)
     return total

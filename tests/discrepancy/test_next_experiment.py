@@ -8,7 +8,7 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.next_experiment import _identified
+from sea_ident.discrepancy.next_experiment import _data_of, _identified
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
@@ -57,3 +57,11 @@ def test_a_stiffness_below_zero_predicts_no_deflection():
     assert motors.stiffness["knee"] == leg.spring("knee").stiffness
     assert motors.stiffness["hip"] == pytest.approx(model.springs[0].stiffness)
     assert "knee" not in motors.cubic_stiffness
+
+
+def test_what_drifts_in_the_recording_is_not_in_the_proposed_motion(nothing_missing, laboratory):
+    """It has other samples and no torque of its own."""
+    data = replace(nothing_missing[0].data, known=np.ones((nothing_missing[0].data.samples, 6)))
+    proposed = _data_of(data, laboratory.leg, laboratory.motions[1], None)
+    assert proposed.samples < data.samples
+    np.testing.assert_array_equal(proposed.target(proposed.tau_motor), 0.0)

@@ -8,6 +8,7 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import (
+    Trend,
     _Direction,
     _explained,
     _gain,
@@ -161,3 +162,17 @@ def test_a_drift_within_a_period_is_no_effect_of_its_own(laboratory):
     np.testing.assert_allclose(known[:, 0], -150.0 * bench.data.period / 60.0 * saw * deflection, rtol=0.1, atol=2e-3)
     np.testing.assert_allclose(known[:, 1], -known[:, 0])
     np.testing.assert_array_equal(known[:, 2:], 0.0)
+
+
+def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
+    """Friction of a motor that warms up: its course within a period is that of the temperature, not of a time."""
+    bench = laboratory.bench(laboratory.record(periods=8))
+    now = settle(bench, bench.effects)
+    effect = bench.anchored((*now.fit.effects, make_effect("temperature_friction", "knee")), now.fit.parameters)[-1]
+    trend = Trend(effect, np.array([0.0, 0.1]), np.zeros(2), 1.0, 0.0, 0.1)
+    temperature = np.tile(25.0 + 2.0 * np.arange(8.0)[:, None], (1, 3))
+    known = within_periods(bench, now.fit, [trend], temperature)
+    saw = 2.0 * ((np.arange(bench.data.samples) + 0.5) / bench.data.samples - 0.5)
+    knee = [e for e, eq in enumerate(bench.data.equations) if (eq.joint, str(eq.kind)) == ("knee", "motor")]
+    friction = bench.data.rows(effect.steady(bench.state(now.fit.effects)))[:, knee[0], 1]
+    np.testing.assert_allclose(known[:, knee[0]], 0.1 * saw * friction, atol=1e-12)
