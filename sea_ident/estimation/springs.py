@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import JointEffect, corrected_motion
@@ -13,6 +12,7 @@ from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
+from sea_ident.estimation.spring_verdict import held_out_rms, verdict_of
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
@@ -20,15 +20,6 @@ from sea_ident.processing import ProcessedRecording
 
 if TYPE_CHECKING:
     from sea_ident.estimation.model import Model
-
-FOLDS = 10
-"""Pieces of the period of which each is predicted from the others."""
-
-EXCITED = 0.25
-"""Relative standard deviation of the stiffness beyond which a spring counts as not excited."""
-
-SUPPORT = 1e-3
-"""Significance that a term beyond the linear spring needs."""
 
 ROUNDING = 1e-14
 """Smallest to largest eigenvalue of normalised products below which columns are the same but for rounding."""
@@ -214,8 +205,8 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
     std = np.sqrt(np.maximum(np.diag(full), 0.0))
     own = [k for k in range(count) if k != 1]
     linear = np.linalg.lstsq(whole[:, own] / scale[own], tau, rcond=None)[0] / scale[own]
-    held_out = _held_out(whole, motion, joint, zero, tau)
-    verdict, note = _verdict(law, std, freedom, held_out, float(np.std(columns[:, 0])), float(np.std(tau)))
+    held_out = held_out_rms(whole, motion, joint, zero, tau)
+    verdict, note = verdict_of(law, std, freedom, held_out, float(np.std(columns[:, 0])), float(np.std(tau)))
     return SpringResult(
         joint=name,
         stiffness=float(law[0]),
@@ -334,69 +325,3 @@ def _residual_covariance(inverse: FloatArray, residual: FloatArray) -> FloatArra
     pieces = np.array_split(np.arange(len(residual)), min(40, max(len(residual) // 8, 1)))
     scores = np.array([inverse[:, piece] @ residual[piece] for piece in pieces])
     return np.asarray(scores.T @ scores, dtype=np.float64)
-
-
-def hysteresis_column(deflection: FloatArray, width: float) -> FloatArray:
-    """A Maxwell-slip element of unit strength: it follows the deflection and slips at +-width.
-
-    Args:
-        deflection: (N,) over one period or a whole recording [rad].
-        width: deflection at which it slips [rad].
-
-    Returns:
-        (N,) its torque as a share of the slip torque; run twice, so that its start does not count.
-    """
-    state, out = 0.0, np.empty_like(deflection)
-    before = float(deflection[-1])
-    for turn in range(2):
-        for k, value in enumerate(deflection):
-            state = min(max(state + (float(value) - before) / width, -1.0), 1.0)
-            before = float(value)
-            if turn:
-                out[k] = state
-    return out
-
-
-def _held_out(columns: FloatArray, motion: Motion, joint: int, zero: float, tau: FloatArray) -> dict[str, float]:
-    """Rms [N m] on pieces of the period that were left out of the fit, by law."""
-    deflection = motion.deflection[:, joint] - zero
-    reach = 3.0 * float(np.std(deflection))
-    laws = {"linear": np.delete(columns, 1, axis=1), "cubic": columns}
-    for share in (0.05, 0.2):
-        slip = hysteresis_column(deflection, max(share * reach, 1e-300))
-        laws[f"hysteresis {share:g}"] = np.column_stack([columns, slip])
-    pieces = np.array_split(np.arange(len(tau)), FOLDS)
-    found = {}
-    for label, table in laws.items():
-        total = 0.0
-        norms = np.linalg.norm(table, axis=0)
-        norms = np.where(norms > 0.0, norms, 1.0)
-        scaled = table / norms
-        for piece in pieces:
-            train = np.ones(len(tau), dtype=bool)
-            train[piece] = False
-            values = np.linalg.lstsq(scaled[train], tau[train], rcond=None)[0]
-            total += float(((tau[piece] - scaled[piece] @ values) ** 2).sum())
-        found[label] = float(np.sqrt(total / len(tau)))
-    hysteresis = min((label for label in found if label.startswith("hysteresis")), key=lambda label: found[label])
-    return {"linear": found["linear"], "cubic": found["cubic"], "hysteresis": found[hysteresis]}
-
-
-def _verdict(
-    law: FloatArray, std: FloatArray, freedom: float, held_out: dict[str, float], spread: float, torque: float
-) -> tuple[Verdict, str]:
-    """Which terms the data support: significant, and better on pieces that were left out."""
-    relative = std[0] / abs(law[0]) if law[0] != 0.0 else np.inf
-    if relative > EXCITED or torque <= 0.0:
-        return (
-            Verdict.NOT_EXCITED,
-            f"stiffness known to {100 * min(relative, 99.0):.0f} % only: deflections of {spread:.2g} (rms) are too "
-            "small",
-        )
-    linear, cubic, hysteresis = held_out["linear"], held_out["cubic"], held_out["hysteresis"]
-    limit = stats.norm.ppf(1 - SUPPORT / 2) if not np.isfinite(freedom) else stats.t.ppf(1 - SUPPORT / 2, freedom)
-    if hysteresis < 0.7 * cubic and hysteresis < 0.7 * linear and cubic > 0.01 * torque:
-        return Verdict.HYSTERETIC, f"held-out rms falls from {cubic:.3g} to {hysteresis:.3g} with a slipping element"
-    if abs(law[1]) > limit * std[1] and cubic < linear:
-        return Verdict.STIFFENING, f"held-out rms falls from {linear:.3g} to {cubic:.3g} with the cubic term"
-    return Verdict.LINEAR, f"held-out rms {linear:.3g} without and {cubic:.3g} with the cubic term"
