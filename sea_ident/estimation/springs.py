@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
@@ -17,6 +17,7 @@ from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncert
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
+from sea_ident.processing.harmonics import differentiate_periods
 
 if TYPE_CHECKING:
     from sea_ident.estimation.model import Model
@@ -82,7 +83,8 @@ def springs_from(
         )
     tau = observations.spring_torque(observations.mean, processed.tau_motor, values)
     # a spring lies between the motor and the bodies, wherever an encoder that errs sees these
-    motion = corrected_motion(robot, observations.effects, processed.motion)
+    motions = _deflections(processed, elastic)
+    motion = corrected_motion(robot, observations.effects, Motion.mean(motions))
     per_period = None
     if processed.periods > 1 and len(uncertainty.influences) == processed.periods:
         per_period = [
@@ -91,7 +93,7 @@ def springs_from(
                 observations.spring_torque(rows, torque, values),
             )
             for own_motion, rows, torque in zip(
-                processed.period_motions, observations.each_period(), processed.period_tau_motor, strict=True
+                motions, observations.each_period(), processed.period_tau_motor, strict=True
             )
         ]
     results = []
@@ -123,6 +125,28 @@ def springs_from(
             result = replace(result, verdict=Verdict.CIRCULAR, note=circular_note(factor))
         results.append(result)
     return tuple(results)
+
+
+def _deflections(processed: ProcessedRecording, elastic: IntArray) -> tuple[Motion, ...]:
+    """Motions of the periods with no more harmonics of theta than of q.
+
+    In a spring both ends count alike. Harmonics of theta without those of q beside them would be deflections that no
+    torque of the link answers, and make the spring softer and its damping smaller.
+    """
+    motions = processed.period_motions or (processed.motion,)
+    harmonics = processed.link_harmonics
+    if processed.period is None or processed.motor_harmonics <= harmonics:
+        return motions
+    stack = np.stack([each.theta[:, elastic] for each in motions])
+    places = processed.places if len(processed.places) == len(motions) else (0,)
+    found = differentiate_periods(stack, processed.period, harmonics, places)
+    changed = []
+    for p, each in enumerate(motions):
+        parts = [each.theta.copy(), each.dtheta.copy(), each.ddtheta.copy()]
+        for whole, part in zip(parts, found, strict=True):
+            whole[:, elastic] = part[p]
+        changed.append(replace(each, theta=parts[0], dtheta=parts[1], ddtheta=parts[2]))
+    return tuple(changed)
 
 
 def spring_from_torque(name: str, joint: int, motion: Motion, torque: FloatArray, unknown_zero: bool) -> SpringResult:

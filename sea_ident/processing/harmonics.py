@@ -4,10 +4,18 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
 from sea_ident._typing import FloatArray
 
 SIGNIFICANCE = 1e-3
+
+BANDS = (31, 125)
+"""Numbers of neighbouring harmonics that are judged together: a wide band sees weaker signals."""
+
+REPEATED = 4.0
+"""How much more the motor's signal that is left out counts than noise that is kept."""
 
 FEWEST_AT_END = 6
 """Samples at least through which the end of a stretch of periods is laid."""
@@ -57,14 +65,74 @@ def choose_harmonics(stack: FloatArray, most: int) -> int:
     Returns:
         Number of harmonics, at least 1, the largest over the signals.
     """
-    power, noise = spectrum(stack)
-    power, noise = power[:most], noise[:most]
-    weight = np.arange(1, len(power) + 1)[:, None] ** 4.0
-    significant = power > noise * np.log(len(power) / SIGNIFICANCE)
-    signal = np.where(significant, np.maximum(power - noise, 0.0), 0.0)
+    power, noise = spectrum(stack)[:, :most]
+    return _cheapest(noise, _single_signal(power, noise))
+
+
+def choose_motor_harmonics(stack: FloatArray, most: int) -> int:
+    """The number of harmonics of motors, whose friction makes them jerk at every reversal.
+
+    The tail of such a motion lies below the noise in every harmonic, and yet carries torque. As it repeats in every
+    period, no average takes it away and no spread between periods shows it. So harmonics count by bands, in which the
+    signal stands out where no harmonic of it does, and what is left out counts more than the noise of what is kept.
+    One period alone tells too little of the noise for that.
+
+    Args:
+        stack: (P, N, n) positions of P periods.
+        most: largest number to choose.
+
+    Returns:
+        Number of harmonics, at least 1, the largest over the signals.
+    """
+    if len(stack) < 2:
+        return choose_harmonics(stack, most)
+    power, noise = spectrum(stack)[:, :most]
+    single = _single_signal(power, noise)
+    bands = [_band_signal(power, noise, single == 0.0, width, len(stack)) for width in BANDS]
+    return _cheapest(noise, REPEATED * np.max([single, *bands], axis=0))
+
+
+def _cheapest(noise: FloatArray, signal: FloatArray) -> int:
+    """Where noise (L, n) kept and signal (L, n) left out are least in the acceleration, largest over the signals."""
+    weight = np.arange(1, len(noise) + 1)[:, None] ** 4.0
     kept = np.cumsum(weight * noise, axis=0)
-    lost = np.concatenate([np.cumsum((weight * signal)[::-1], axis=0)[::-1][1:], np.zeros((1, power.shape[1]))])
+    lost = np.concatenate([np.cumsum((weight * signal)[::-1], axis=0)[::-1][1:], np.zeros((1, noise.shape[1]))])
     return int(np.argmin(kept + lost, axis=0).max()) + 1
+
+
+def _single_signal(power: FloatArray, noise: FloatArray) -> FloatArray:
+    """(L, n) power of the signal in harmonics that stand out of the noise one by one, else 0."""
+    significant = power > noise * np.log(len(power) / SIGNIFICANCE)
+    return np.where(significant, np.maximum(power - noise, 0.0), 0.0)
+
+
+def _band_signal(
+    power: FloatArray, noise: FloatArray, counted: NDArray[np.bool_], width: int, periods: int
+) -> FloatArray:
+    """(L, n) power of the signal where a band of harmonics stands out of the noise together, else 0.
+
+    Powers of noise are exponentially distributed; so their mean over a band, relative to a noise that was found from
+    the scatter of the periods in that band, follows Fisher's distribution.
+
+    Args:
+        power: (L, n) of the mean over the periods.
+        noise: (L, n) of it.
+        counted: (L, n) harmonics that do not stand out by themselves; the others would spread over their band.
+        width: harmonics in a band, an odd number.
+        periods: P that the noise comes from.
+    """
+    number = _moving_sum(counted.astype(np.float64), width)
+    total = _moving_sum(np.where(counted, power / noise, 0.0), width)
+    mean = np.divide(total, number, out=np.ones_like(total), where=number > 0.0)
+    freedom = 2.0 * np.maximum(number, 1.0)
+    limit = stats.f.isf(SIGNIFICANCE / max(len(power) / width, 1.0), freedom, freedom * (periods - 1))
+    return np.asarray(np.where(counted & (mean > limit), noise * (mean - 1.0), 0.0), dtype=np.float64)
+
+
+def _moving_sum(values: FloatArray, width: int) -> FloatArray:
+    """(L, n) sums over an odd number of neighbours, fewer at the ends."""
+    total = np.cumsum(np.pad(values, ((width // 2 + 1, width // 2), (0, 0))), axis=0)
+    return np.asarray(total[width:] - total[:-width], dtype=np.float64)
 
 
 def differentiate(values: FloatArray, period: float, harmonics: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -249,7 +249,7 @@ def _periodic(
     links = link_harmonics or harmonics.choose_harmonics(cuts["q"], most)
     motors = links
     if elastic.size:
-        motors = motor_harmonics or harmonics.choose_harmonics(cuts["theta"][:, :, elastic], most)
+        motors = motor_harmonics or harmonics.choose_motor_harmonics(cuts["theta"][:, :, elastic], most)
     for label, number in (("link_harmonics", links), ("motor_harmonics", motors)):
         if not 1 <= number <= (cut.samples - 1) // 2:
             raise RecordingError(
