@@ -181,10 +181,7 @@ class _Whitening:
         gains = np.sqrt(samples / power)
         # beyond the harmonics kept, linear terms were cut off while products still reach there
         gains[min(observations.processed.link_harmonics, observations.processed.motor_harmonics) + 1 :] = 0.0
-        valid, own = (
-            observations.valid * steady(observations, observations.processed.raw_tau_variance),
-            scatter[:, :, links:],
-        )
+        valid, own = observations.valid * steady(observations), scatter[:, :, links:]
         variance = smooth_over_phase((own**2).sum(axis=0), observations.processed.interval, SMOOTHING)
         variance = variance / (periods * (periods - 1.0))
         count = np.maximum(valid.sum(axis=0), 1.0)

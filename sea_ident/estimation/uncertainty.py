@@ -81,8 +81,7 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
 
     The estimate solves ``Z' (torque - F values) = 0``, so period p moves it by ``(Z' F)^-1 Z' r_p / P``, with r_p the
     residual of that period at its own motion: noise of encoders and torque, coloured or not, and what the
-    controller makes of both, are all inside. Weights that were found from the same periods move the estimate, too; what
-    a period does through them is added. Whole periods are taken as independent; nothing is assumed within one.
+    controller makes of both, are all inside. Whole periods are taken as independent; nothing is assumed within one.
 
     Args:
         observations: the data.
@@ -107,8 +106,6 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
     periods = len(residuals)
     drifted: tuple[str, ...] = ()
     scores = period_scores(residuals, estimate.instruments, observations.processed.places)
-    if estimate.weight_scores is not None:
-        scores = scores + estimate.weight_scores
     influences = scores @ estimate.inverse.T / periods
     if periods >= FEW_PERIODS:
         covariance = influences.T @ influences * (periods / (periods - 1.0))

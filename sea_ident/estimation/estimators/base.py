@@ -23,8 +23,6 @@ class Estimate:
         covariance: (b, b) model-based covariance (paper, eq. 13).
         log_det_weighted: natural logarithm of det F' Sigma^-1 F.
         period_torque: (P, N, n) torques that were used in place of the measured ones, None where those were used.
-        weight_scores: (P, b) by how much every period moves ``Z' residual`` through the weights, as a part of the sum
-            over all periods; None where the weights hardly depend on the periods.
         motion: motion that was used in place of the mean one, None where that was used.
         notes: what was done.
         warnings: what a user should know.
@@ -37,7 +35,6 @@ class Estimate:
     covariance: FloatArray
     log_det_weighted: float
     period_torque: FloatArray | None = None
-    weight_scores: FloatArray | None = None
     motion: Motion | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

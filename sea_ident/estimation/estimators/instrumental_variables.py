@@ -1,14 +1,14 @@
 """Instrumental variables: no bias from noise in the regressor, nor from a controller that feeds it back."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators.base import Estimate, Estimator
-from sea_ident.estimation.estimators.weights import SampleWeights, sample_weights, steady, weight_influences
+from sea_ident.estimation.estimators.weights import SampleWeights, sample_weights, steady
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
@@ -48,14 +48,10 @@ class InstrumentalVariables(Estimator):
 
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
-        first = sample_weights(observations, self.smoothing, steady)
+        first = sample_weights(observations, self.smoothing, steady(observations))
         if self.simulator is None:
-            found = _other_periods(observations, first)
-        else:
-            found = self._simulated(observations, first, self.simulator)
-        residual = observations.residual(found.values)
-        scores = weight_influences(observations, first, self.smoothing, steady, residual, found.instruments)
-        return replace(found, weight_scores=scores)
+            return _other_periods(observations, first)
+        return self._simulated(observations, first, self.simulator)
 
     def _simulated(self, observations: Observations, first: SampleWeights, simulator: Simulator) -> Estimate:
         rows, torque, weights, values = observations.rows, observations.torque, first.weights, first.solution.values

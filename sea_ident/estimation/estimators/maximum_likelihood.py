@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, lsmr
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.estimation.estimators.base import Estimate, Estimator
-from sea_ident.estimation.estimators.weights import sample_weights, steady, weight_influences
+from sea_ident.estimation.estimators.weights import sample_weights, steady
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.solve import solve_weighted
 from sea_ident.exceptions import IdentificationError
@@ -49,7 +49,7 @@ class MaximumLikelihood(Estimator):
                 f"{processed.source}: maximum likelihood takes the noise of the angles from the scatter between "
                 "periods; it needs a periodic recording with at least two periods"
             )
-        first = sample_weights(observations, self.smoothing, steady)
+        first = sample_weights(observations, self.smoothing, steady(observations))
         weights = first.weights
         noise = _MotionNoise.build(observations)
         motion, rows = processed.motion, observations.rows
@@ -86,9 +86,6 @@ class MaximumLikelihood(Estimator):
             weights=weights,
             covariance=0.5 * (inverse + inverse.T),
             log_det_weighted=solution.log_det,
-            weight_scores=weight_influences(
-                observations, first, self.smoothing, steady, observations.torque - rows @ values, instruments
-            ),
             motion=motion,
             notes=first.notes,
             warnings=first.warnings,

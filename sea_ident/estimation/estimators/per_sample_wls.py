@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident.estimation.estimators.base import Estimate, Estimator
-from sea_ident.estimation.estimators.weights import all_alike, sample_weights, weight_influences
+from sea_ident.estimation.estimators.weights import sample_weights
 from sea_ident.estimation.observations import Observations
 from sea_ident.processing.process import SMOOTHING
 
@@ -27,17 +27,14 @@ class PerSampleWLS(Estimator):
 
     def estimate(self, observations: Observations) -> Estimate:
         """Estimate; see `Estimator.estimate`."""
-        found = sample_weights(observations, self.smoothing, all_alike)
-        instruments = observations.rows * found.weights[:, :, None]
-        residual = observations.residual(found.solution.values)
+        found = sample_weights(observations, self.smoothing)
         return Estimate(
             values=found.solution.values,
-            instruments=instruments,
+            instruments=observations.rows * found.weights[:, :, None],
             inverse=found.solution.inverse,
             weights=found.weights,
             covariance=found.solution.inverse,
             log_det_weighted=found.solution.log_det,
-            weight_scores=weight_influences(observations, found, self.smoothing, all_alike, residual, instruments),
             notes=found.notes,
             warnings=found.warnings,
         )

@@ -1,6 +1,6 @@
 """Weights per sample: scatter between periods, and what the model lacks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.solve import Solution, solve_weighted
-from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.variance import smooth_over_phase
-
-Share = Callable[[Observations, FloatArray], FloatArray]
-"""From observations and the variance of the torque between periods (N, n) to how much every sample counts (N, n)."""
 
 VARIANCE_FLOOR = 1e-6
 """Smallest variance of a sample as a share of the mean variance of its joint."""
@@ -45,7 +41,6 @@ class SampleWeights:
     Attributes:
         weights: (N, n) inverse variances of the mean torque, less where the model claims less, 0 where nothing.
         variance: (N, n) variance of the mean torque and what the model lacks [(N m)^2].
-        rest: (n,) what the model lacks, in the variance of every sample of a joint [(N m)^2].
         solution: weighted least squares with them.
         notes: what adds to the scatter.
         warnings: what a user should know.
@@ -53,13 +48,12 @@ class SampleWeights:
 
     weights: FloatArray
     variance: FloatArray
-    rest: FloatArray
     solution: Solution
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
 
-def sample_weights(observations: Observations, smoothing: float, share: Share) -> SampleWeights:
+def sample_weights(observations: Observations, smoothing: float, share: FloatArray | None = None) -> SampleWeights:
     """Weights from the variance of every sample (paper, eq. 20), smoothed over phase.
 
     The scatter says nothing of what the model lacks. Where the residual is larger than the scatter of the mean, the
@@ -68,8 +62,8 @@ def sample_weights(observations: Observations, smoothing: float, share: Share) -
     Args:
         observations: the data.
         smoothing: width of the window [s].
-        share: how much of a sample counts, from 0 to 1, `steady` or `all_alike`. Samples at which the friction model
-            does not claim to hold count nothing in any case.
+        share: (N, n) how much of a sample counts, from 0 to 1; all of it where None. Samples at which the friction
+            model does not claim to hold count nothing in any case.
 
     Returns:
         The weights.
@@ -78,9 +72,12 @@ def sample_weights(observations: Observations, smoothing: float, share: Share) -
         IdentificationError: the data do not determine the parameters.
     """
     processed = observations.processed
-    variance, warnings = _mean_variance(processed, processed.raw_tau_variance, smoothing)
+    variance = processed.raw_tau_variance
+    if processed.periods > 1:
+        variance = smooth_over_phase(variance, processed.interval, smoothing)
+    variance, warnings = floored(variance / processed.periods, processed.joint_names)
     rows, torque = observations.rows, observations.torque
-    valid = observations.valid * share(observations, processed.raw_tau_variance)
+    valid = observations.valid * (1.0 if share is None else share)
     count = np.maximum(valid.sum(axis=0) - rows.shape[-1] / rows.shape[1], 1.0)
     noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1.0)
     rest = np.zeros(rows.shape[1])
@@ -97,72 +94,10 @@ def sample_weights(observations: Observations, smoothing: float, share: Share) -
         for name, r in zip(observations.robot.joint_names, rest, strict=True)
         if r > 0.0 and processed.periods > 1
     )
-    return SampleWeights(weights, variance + rest, rest, solution, notes, warnings)
+    return SampleWeights(weights, variance + rest, solution, notes, warnings)
 
 
-def _mean_variance(
-    processed: ProcessedRecording, scatter: FloatArray, smoothing: float
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """(N, n) variance of the mean torque from that of one period (N, n), and warnings."""
-    if processed.periods > 1:
-        scatter = smooth_over_phase(scatter, processed.interval, smoothing)
-    return floored(scatter / processed.periods, processed.joint_names)
-
-
-def weight_influences(
-    observations: Observations,
-    found: SampleWeights,
-    smoothing: float,
-    share: Share,
-    residual: FloatArray,
-    instruments: FloatArray,
-) -> FloatArray:
-    """Influence of every period on an estimate through the weights, which were found from the same periods.
-
-    Where the mean residual is larger than chance at samples whose weights are uncertain, as around reversals of a
-    friction that varies, other weights would give another estimate. The spread of the residuals between periods does
-    not see that. So every period is left out of the scatter in turn.
-
-    Args:
-        observations: the data.
-        found: the weights.
-        smoothing: as they were found with [s].
-        share: the same.
-        residual: (N, n) residual of the mean torque [N m] or [N].
-        instruments: (N, n, b) weighted regressor or instruments.
-
-    Returns:
-        (P, b) by how much each period moves ``instruments' residual``, as part of a sum over the periods over P; zero
-        with too few periods to leave one out.
-
-    References:
-        Efron, The Jackknife, the Bootstrap and Other Resampling Plans, SIAM, 1982.
-    """
-    processed = observations.processed
-    periods = processed.periods
-    moves = np.zeros((periods, instruments.shape[-1]))
-    if periods < FEWEST_PERIODS:
-        return moves
-    terms = residual[:, :, None] * instruments
-    deviation = processed.period_tau_motor - processed.tau_motor
-    inverse = np.divide(1.0, found.weights, out=np.zeros_like(found.weights), where=found.weights > 0.0)
-    for p in range(periods):
-        # variance of the others: without this period's deviation, and about their own mean
-        others = (periods - 1.0) * processed.raw_tau_variance - periods / (periods - 1.0) * deviation[p] ** 2
-        scatter = np.maximum(others, 0.0) / (periods - 2.0)
-        variance, _ = _mean_variance(processed, scatter, smoothing)
-        without = observations.valid * share(observations, scatter) / (variance + found.rest)
-        change = np.where(found.weights > 0.0, without * inverse - 1.0, 0.0)
-        moves[p] = (1.0 - periods) * np.einsum("kn,knb->b", change, terms)
-    return np.asarray(moves - moves.mean(axis=0), dtype=np.float64)
-
-
-def all_alike(observations: Observations, scatter: FloatArray) -> FloatArray:
-    """(N, n) ones: every sample counts as a whole, whatever the scatter."""
-    return np.ones_like(scatter)
-
-
-def steady(observations: Observations, scatter: FloatArray) -> FloatArray:
+def steady(observations: Observations) -> FloatArray:
     """(N, n) how much a sample counts: little at speeds so low that friction varies from pass to pass.
 
     Where the torque scatters more near reversal than at speed, friction there is not the same at every pass. Its mean
@@ -174,7 +109,6 @@ def steady(observations: Observations, scatter: FloatArray) -> FloatArray:
 
     Args:
         observations: the data.
-        scatter: (N, n) variance of the torque between periods [(N m)^2].
 
     Returns:
         Share of every sample, from 0 to 1.
@@ -190,7 +124,7 @@ def steady(observations: Observations, scatter: FloatArray) -> FloatArray:
         order = np.argsort(speed[:, j])
         bins = np.array_split(order, SPEED_BINS)
         # the median, so that a spike does not make its class look like a reversal
-        level = np.array([np.median(scatter[part, j]) for part in bins])
+        level = np.array([np.median(processed.raw_tau_variance[part, j]) for part in bins])
         usual = float(np.median(level[SPEED_BINS // 2 :]))
         if usual <= 0.0:
             continue
