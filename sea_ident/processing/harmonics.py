@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray
 SIGNIFICANCE = 1e-3
 
 BANDS = (31, 125)
-"""Numbers of neighbouring harmonics that are judged together: a wide band sees weaker signals."""
+"""Numbers of neighbouring harmonics that are judged together: more see weaker signals, fewer where they end."""
 
 REPEATED = 4.0
 """How much more the motor's signal that is left out counts than noise that is kept."""
@@ -88,8 +88,8 @@ def choose_motor_harmonics(stack: FloatArray, most: int) -> int:
         return choose_harmonics(stack, most)
     power, noise = spectrum(stack)[:, :most]
     single = _single_signal(power, noise)
-    bands = [_band_signal(power, noise, single == 0.0, width, len(stack)) for width in BANDS]
-    return _cheapest(noise, REPEATED * np.max([single, *bands], axis=0))
+    tail = _band_signal(power, noise, single == 0.0, len(stack))
+    return _cheapest(noise, REPEATED * (single + tail))
 
 
 def _cheapest(noise: FloatArray, signal: FloatArray) -> int:
@@ -106,27 +106,29 @@ def _single_signal(power: FloatArray, noise: FloatArray) -> FloatArray:
     return np.where(significant, np.maximum(power - noise, 0.0), 0.0)
 
 
-def _band_signal(
-    power: FloatArray, noise: FloatArray, counted: NDArray[np.bool_], width: int, periods: int
-) -> FloatArray:
+def _band_signal(power: FloatArray, noise: FloatArray, counted: NDArray[np.bool_], periods: int) -> FloatArray:
     """(L, n) power of the signal where a band of harmonics stands out of the noise together, else 0.
 
     Powers of noise are exponentially distributed; so their mean over a band, relative to a noise that was found from
-    the scatter of the periods in that band, follows Fisher's distribution.
+    the scatter of the periods in that band, follows Fisher's distribution. The power is that beyond the noise, by the
+    mean of the narrowest band; chance makes it negative in places, and is not to be rectified.
 
     Args:
         power: (L, n) of the mean over the periods.
         noise: (L, n) of it.
         counted: (L, n) harmonics that do not stand out by themselves; the others would spread over their band.
-        width: harmonics in a band, an odd number.
         periods: P that the noise comes from.
     """
-    number = _moving_sum(counted.astype(np.float64), width)
-    total = _moving_sum(np.where(counted, power / noise, 0.0), width)
-    mean = np.divide(total, number, out=np.ones_like(total), where=number > 0.0)
-    freedom = 2.0 * np.maximum(number, 1.0)
-    limit = stats.f.isf(SIGNIFICANCE / max(len(power) / width, 1.0), freedom, freedom * (periods - 1))
-    return np.asarray(np.where(counted & (mean > limit), noise * (mean - 1.0), 0.0), dtype=np.float64)
+    ratio = np.where(counted, power / noise, 0.0)
+    means, standing = [], np.zeros_like(counted)
+    for width in BANDS:
+        number = _moving_sum(counted.astype(np.float64), width)
+        mean = np.divide(_moving_sum(ratio, width), number, out=np.ones_like(ratio), where=number > 0.0)
+        freedom = 2.0 * np.maximum(number, 1.0)
+        limit = stats.f.isf(SIGNIFICANCE / max(len(power) / width, 1.0), freedom, freedom * (periods - 1))
+        means.append(mean)
+        standing |= mean > limit
+    return np.asarray(np.where(counted & standing, noise * (means[0] - 1.0), 0.0), dtype=np.float64)
 
 
 def _moving_sum(values: FloatArray, width: int) -> FloatArray:

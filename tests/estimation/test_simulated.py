@@ -5,7 +5,8 @@ import pytest
 
 from sea_ident.effects import base_effects
 from sea_ident.effects.link_friction import LinkFriction
-from sea_ident.estimation import LeastSquares, identify
+from sea_ident.estimation import LeastSquares, Observations, identify
+from sea_ident.estimation.springs import springs_from
 from sea_ident.motion import FourierSeries
 from sea_ident.processing import from_states, process
 from sea_ident.regressor import prior_parameters
@@ -54,6 +55,19 @@ def test_error_of_the_whole_chain_falls_as_harmonics_are_added(leg, experiment):
     assert np.all(np.diff(error) < 0.0), error
     assert error[-1] < 0.02 * error[0]
     assert error[-1] < 1e-3
+
+
+def test_springs_do_not_depend_on_harmonics_of_theta_that_q_lacks(leg, experiment):
+    """Those would be deflections that no torque of the link answers."""
+    exact = None
+    found = []
+    for harmonics in (60, 240):
+        processed = process(experiment.recording, leg, period=5.0, link_harmonics=60, motor_harmonics=harmonics)
+        model = identify(leg, processed, estimator=LeastSquares())
+        exact = model.base.project(prior_parameters(leg, base_effects(leg)))
+        laws = springs_from(Observations(leg, model.effects, model.base, processed), exact, model.uncertainty)
+        found.append([(s.stiffness, s.cubic_stiffness, s.damping) for s in laws])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-4)
 
 
 def test_friction_of_links_and_motors_is_told_apart(experiment):

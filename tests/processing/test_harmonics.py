@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from sea_ident.processing.harmonics import differentiate, differentiate_periods
+from sea_ident.processing.harmonics import (
+    choose_harmonics,
+    choose_motor_harmonics,
+    differentiate,
+    differentiate_periods,
+)
 
 PERIOD, SAMPLES, HARMONICS = 10.0, 1000, 20
 BASE = 2.0 * np.pi / PERIOD
@@ -115,3 +120,53 @@ def test_the_mean_of_the_periods_is_the_series_of_the_mean_where_nothing_drifts(
     scale = [1e-5, 1e-5 * 20 * BASE, 1e-5 * (20 * BASE) ** 2]
     for part, one, noise in zip(found, series, scale, strict=True):
         np.testing.assert_allclose(part.mean(axis=0), one, atol=noise)
+
+
+def noisy(position, periods, noise, seed):
+    """(P, N, 1) periods of a position with white noise."""
+    shape = (periods, len(position), 1)
+    return position[:, None] + noise * np.random.default_rng(seed).standard_normal(shape)
+
+
+def jerking():
+    """A motor whose acceleration nearly jumps at every reversal, with its spectrum, in harmonics up to a third."""
+    phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    velocity = np.sin(phase + 0.3) + 0.8 * np.sin(2.0 * phase + 1.0) + 0.7 * np.sin(5.0 * phase - 0.6)
+    acceleration = np.tanh(velocity / 0.1)
+    most = SAMPLES // 3
+    rate = BASE * np.arange(1, most + 1)
+    spectrum = np.zeros(SAMPLES // 2 + 1, dtype=complex)
+    spectrum[1 : most + 1] = -np.fft.rfft(acceleration)[1 : most + 1] / rate**2
+    return np.fft.irfft(spectrum, SAMPLES), np.abs(spectrum[1 : most + 1] / SAMPLES) ** 2
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-5, 1e-4])
+def test_what_is_left_out_of_a_jerking_motor_is_small_beside_the_noise_of_what_is_kept(noise):
+    periods = 12
+    position, power = jerking()
+    weight = np.arange(1, len(power) + 1) ** 4.0
+    kept = np.cumsum(weight) * noise**2 / (SAMPLES * periods)
+    lost = np.append(np.cumsum((weight * power)[::-1])[::-1][1:], 0.0)
+    ratio = np.sqrt(lost / kept)
+    stacks = [noisy(position, periods, noise, seed) for seed in range(10)]
+    by_one = np.array([choose_harmonics(stack, len(power)) for stack in stacks]) - 1
+    by_bands = np.array([choose_motor_harmonics(stack, len(power)) for stack in stacks]) - 1
+    assert np.max(ratio[by_bands]) < 0.65
+    assert np.mean(ratio[by_bands]) < 0.3 * np.mean(ratio[by_one])
+    # nor is more kept than what the truth would advise
+    cost = kept + 4.0 * lost
+    assert np.mean(cost[by_bands]) < 1.5 * cost.min() < np.mean(cost[by_one])
+
+
+@pytest.mark.parametrize("periods", [2, 5, 20])
+@pytest.mark.parametrize("number", [3, 20])
+def test_a_motor_without_a_tail_keeps_no_more_harmonics_than_it_has(number, periods):
+    phase = 2.0 * np.pi * np.arange(200) / 200
+    position = 0.3 * np.sin(phase + 0.4) + 0.1 * np.sin(2.0 * phase) + 0.3 / number**2 * np.sin(number * phase + 1.0)
+    found = [choose_motor_harmonics(noisy(position, periods, 1e-5, seed), 66) for seed in range(10)]
+    assert np.mean(np.array(found) == number) >= 0.9
+
+
+def test_one_period_tells_too_little_of_the_noise_to_judge_bands():
+    stack = noisy(jerking()[0], 1, 1e-5, 0)
+    assert choose_motor_harmonics(stack, 333) == choose_harmonics(stack, 333)
