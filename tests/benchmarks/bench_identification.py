@@ -1,14 +1,16 @@
 """Do the intervals hold the truth, is the estimate unbiased, and what is weighting by sample worth?
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_identification.py [--seeds 200] [--first 0]
-        [--estimators default "one shot"] [--pool 1] [--keep FILE]
+        [--estimators default "one shot"] [--settings jitter copy steady] [--pool 1 2] [--keep FILE]
 
 Exoskeleton leg, 20 periods of an optimised excitation, the simulator's default sensors, with friction that varies from
 pass to pass, the same with a period that is a copy and therefore left out, and with every pass alike. Per parameter:
 bias and stated standard deviation in units of the true one, coverage of the 95 % interval. For the weightings: mean
 squared error relative to one variance per joint, and rms of the torque error on a gait that was not used. The first
-hundred seeds have simulated passes of their own, the others share halves of them (see experiments.py). With 200 seeds
-a coverage is known to 1.5 %, a bias to 0.07 of the standard deviation. What it printed is in results/identification.md.
+hundred seeds of a pool have simulated passes of their own, the others share halves of them (see experiments.py). A seed
+draws its sensor noise, the same in every pool and setting: what is to be independent takes other seeds. Several pools
+take as many seeds each, one after the other. With 200 seeds a coverage is known to 1.5 %, a bias to 0.07 of the
+standard deviation. What it printed is in results/identification.md.
 """
 
 import argparse
@@ -51,11 +53,11 @@ ESTIMATORS = {
 }
 ONE_SHOT = "one shot"
 
-SETTINGS = (
-    ("friction varies from pass to pass", "jitter", {}, None),
-    ("friction varies from pass to pass, period 11 of 20 is a copy", "jitter", {}, 10),
-    ("every pass alike", "steady", {"jitter": FrictionJitter.none()}, None),
-)
+SETTINGS = {
+    "jitter": ("friction varies from pass to pass", "jitter", {}, None),
+    "copy": ("friction varies from pass to pass, period 11 of 20 is a copy", "jitter", {}, 10),
+    "steady": ("every pass alike", "steady", {"jitter": FrictionJitter.none()}, None),
+}
 """Title, pool, its settings, and which period is a copy."""
 
 
@@ -155,17 +157,22 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--estimators", nargs="+", choices=[*ESTIMATORS, ONE_SHOT], default=[*ESTIMATORS, ONE_SHOT])
     parser.add_argument("--first", type=int, default=0, help="seed to begin with")
-    parser.add_argument("--pool", type=int, default=1, help="seed of the simulated passes")
+    parser.add_argument("--settings", nargs="+", choices=[*SETTINGS], default=[*SETTINGS])
+    parser.add_argument("--pool", type=int, nargs="+", default=[1], help="seeds of the simulated passes")
     parser.add_argument("--keep", type=Path, help="file of seeds that are done; a run that was cut goes on from it")
     arguments = parser.parse_args()
-    seeds = range(arguments.first, arguments.first + arguments.seeds)
-    for title, name, settings, copied in SETTINGS:
+    for label in arguments.settings:
+        title, name, settings, copied = SETTINGS[label]
         begin = time.process_time()
-        pool = cached_pool(name, PASSES if name == "jitter" else 2 * PERIODS, arguments.pool, **settings)
+        results = []
+        for place, number in enumerate(arguments.pool):
+            pool = cached_pool(name, PASSES if name == "jitter" else 2 * PERIODS, number, **settings)
+            first = arguments.first + place * arguments.seeds
+            run = partial(one_seed, pool, Sensors(), arguments.estimators, copied)
+            setting = f"{title}, pool {number}"
+            results += each_seed(arguments.keep, setting, range(first, first + arguments.seeds), run)
         names = find_base_parameters(pool.robot, base_effects(pool.robot)).names
         names = [*names, *(f"{j} {k}" for j in pool.robot.joint_names for k in ("K1", "K3", "D"))]
-        run = partial(one_seed, pool, Sensors(), arguments.estimators, copied)
-        results = each_seed(arguments.keep, f"{title}, pool {arguments.pool}", seeds, run)
         table(title, names, results)
         weightings(pool, results)
         print(f"\n  {time.process_time() - begin:.0f} s of CPU time", flush=True)
