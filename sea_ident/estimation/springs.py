@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sea_ident._typing import FloatArray, IntArray
+from sea_ident._typing import FloatArray
 from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
@@ -17,7 +17,7 @@ from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncert
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
-from sea_ident.processing.harmonics import differentiate_periods
+from sea_ident.processing.harmonics import differentiate
 
 if TYPE_CHECKING:
     from sea_ident.estimation.model import Model
@@ -83,8 +83,7 @@ def springs_from(
         )
     tau = observations.spring_torque(observations.mean, processed.tau_motor, values)
     # a spring lies between the motor and the bodies, wherever an encoder that errs sees these
-    motions = _deflections(processed, elastic)
-    motion = corrected_motion(robot, observations.effects, Motion.mean(motions))
+    motion = corrected_motion(robot, observations.effects, processed.motion)
     per_period = None
     if processed.periods > 1 and len(uncertainty.influences) == processed.periods:
         per_period = [
@@ -93,7 +92,7 @@ def springs_from(
                 observations.spring_torque(rows, torque, values),
             )
             for own_motion, rows, torque in zip(
-                motions, observations.each_period(), processed.period_tau_motor, strict=True
+                processed.period_motions, observations.each_period(), processed.period_tau_motor, strict=True
             )
         ]
     results = []
@@ -111,6 +110,7 @@ def springs_from(
             tuple(effect for effect in effects if effect.joint == name),
             tuple(len(effect.columns(robot)) for effect in effects if effect.joint == name),
             processed.places,
+            processed.link_harmonics if processed.motor_harmonics > processed.link_harmonics else 0,
         )
         result = _one_spring(data, name in unknown_zero)
         channels = processed.channels
@@ -127,28 +127,6 @@ def springs_from(
     return tuple(results)
 
 
-def _deflections(processed: ProcessedRecording, elastic: IntArray) -> tuple[Motion, ...]:
-    """Motions of the periods with no more harmonics of theta than of q.
-
-    In a spring both ends count alike. Harmonics of theta without those of q beside them would be deflections that no
-    torque of the link answers, and make the spring softer and its damping smaller.
-    """
-    motions = processed.period_motions or (processed.motion,)
-    harmonics = processed.link_harmonics
-    if processed.period is None or processed.motor_harmonics <= harmonics:
-        return motions
-    stack = np.stack([each.theta[:, elastic] for each in motions])
-    places = processed.places if len(processed.places) == len(motions) else (0,)
-    found = differentiate_periods(stack, processed.period, harmonics, places)
-    changed = []
-    for p, each in enumerate(motions):
-        parts = [each.theta.copy(), each.dtheta.copy(), each.ddtheta.copy()]
-        for whole, part in zip(parts, found, strict=True):
-            whole[:, elastic] = part[p]
-        changed.append(replace(each, theta=parts[0], dtheta=parts[1], ddtheta=parts[2]))
-    return tuple(changed)
-
-
 def spring_from_torque(name: str, joint: int, motion: Motion, torque: FloatArray, unknown_zero: bool) -> SpringResult:
     """A spring from its torque (N,) as it was measured [N m], with the uncertainty that the residual shows."""
     none = np.zeros((1, 1))
@@ -159,7 +137,11 @@ def spring_from_torque(name: str, joint: int, motion: Motion, torque: FloatArray
 
 @dataclass(frozen=True, eq=False)
 class _SpringData:
-    """What is known of one spring: its torque as the dynamic model gives it, with rows (N, b) for its uncertainty."""
+    """What is known of one spring: its torque as the dynamic model gives it, with rows (N, b) for its uncertainty.
+
+    `harmonics` are those of q where theta has more, else 0. Harmonics of theta without those of q beside them would be
+    deflections that no torque of the link answers.
+    """
 
     name: str
     joint: int
@@ -171,6 +153,11 @@ class _SpringData:
     effects: tuple[JointEffect, ...] = ()
     widths: tuple[int, ...] = ()
     places: tuple[int, ...] = (0,)
+    harmonics: int = 0
+
+    def answered(self, table: FloatArray) -> FloatArray:
+        """(N, c) columns in the harmonics that q has, too."""
+        return differentiate(table, 1.0, self.harmonics)[0] if self.harmonics else table
 
     def columns(self, motion: Motion, zero: float) -> FloatArray:
         """(N, 3 + k) columns of K1, K3, D and of the other effects."""
@@ -269,7 +256,8 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     """Solve for the law.
 
     Noise of the deflection, squared, would make the spring look softer. With periods, every product is therefore taken
-    between different periods, whose noises are independent.
+    between different periods, whose noises are independent. One side of the products has no harmonics beyond those of
+    q.
 
     Args:
         data: the spring.
@@ -282,22 +270,27 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     design = np.column_stack([data.columns(data.motion, zero), extra])
     norms = np.linalg.norm(design, axis=0)
     if data.per_period is None:
-        inverse = np.linalg.pinv(design / norms) / norms[:, None]
+        if data.harmonics:
+            instruments = data.answered(design / norms)
+            inverse = np.linalg.solve(instruments.T @ (design / norms), instruments.T) / norms[:, None]
+        else:
+            inverse = np.linalg.pinv(design / norms) / norms[:, None]
         return inverse @ data.tau, inverse
     periods = len(data.per_period)
     tables = [np.column_stack([data.columns(motion, zero), extra]) / norms for motion, _ in data.per_period]
     torques = [tau for _, tau in data.per_period]
-    table, torque = sum(tables) / periods, sum(torques) / periods
-    own = sum(t.T @ t for t in tables) / periods
-    side = sum(t.T @ tau for t, tau in zip(tables, torques, strict=True)) / periods
-    gram = (periods * table.T @ table - own) / (periods - 1.0)
+    instruments = [data.answered(table) for table in tables]
+    table, torque, instrument = sum(tables) / periods, sum(torques) / periods, sum(instruments) / periods
+    own = sum(z.T @ t for z, t in zip(instruments, tables, strict=True)) / periods
+    side = sum(z.T @ tau for z, tau in zip(instruments, torques, strict=True)) / periods
+    gram = (periods * instrument.T @ table - own) / (periods - 1.0)
     if np.linalg.cond(gram) > 1e12:
-        gram, side = table.T @ table, table.T @ torque
-        _tell_apart(data, gram)
+        gram, side = instrument.T @ table, instrument.T @ torque
+        _tell_apart(data, table.T @ table)
     else:
-        side = (periods * table.T @ torque - side) / (periods - 1.0)
+        side = (periods * instrument.T @ torque - side) / (periods - 1.0)
     values = np.linalg.solve(gram, side) / norms
-    return values, np.linalg.solve(gram, table.T) / norms[:, None]
+    return values, np.linalg.solve(gram, instrument.T) / norms[:, None]
 
 
 def _tell_apart(data: _SpringData, gram: FloatArray) -> None:

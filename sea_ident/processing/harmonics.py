@@ -14,6 +14,12 @@ SIGNIFICANCE = 1e-3
 BANDS = (31, 125)
 """Numbers of neighbouring harmonics that are judged together: more see weaker signals, fewer where they end."""
 
+AVERAGES_OUT = 1.5
+"""Floor of the spectrum of the mean over what the scatter of the periods leaves there, up to which it is all noise."""
+
+FEWEST_PERIODS = 6
+"""Periods from which on the noise is known well enough to judge bands by it."""
+
 REPEATED = 4.0
 """How much more the motor's signal that is left out counts than noise that is kept."""
 
@@ -75,7 +81,8 @@ def choose_motor_harmonics(stack: FloatArray, most: int) -> int:
     The tail of such a motion lies below the noise in every harmonic, and yet carries torque. As it repeats in every
     period, no average takes it away and no spread between periods shows it. So harmonics count by bands, in which the
     signal stands out where no harmonic of it does, and what is left out counts more than the noise of what is kept.
-    One period alone tells too little of the noise for that.
+    Few periods tell too little of the noise for that, and so do encoders whose steps repeat in every period: their
+    spectrum may have any shape.
 
     Args:
         stack: (P, N, n) positions of P periods.
@@ -84,12 +91,23 @@ def choose_motor_harmonics(stack: FloatArray, most: int) -> int:
     Returns:
         Number of harmonics, at least 1, the largest over the signals.
     """
-    if len(stack) < 2:
+    if len(stack) < FEWEST_PERIODS:
         return choose_harmonics(stack, most)
     power, noise = spectrum(stack)[:, :most]
     single = _single_signal(power, noise)
-    tail = _band_signal(power, noise, single == 0.0, len(stack))
-    return _cheapest(noise, REPEATED * (single + tail))
+    tail = np.where(_averages_out(stack), _band_signal(power, noise, single == 0.0, len(stack)), 0.0)
+    weight = np.where(np.any(tail != 0.0, axis=0), REPEATED, 1.0)
+    return _cheapest(noise, weight * (single + tail))
+
+
+def _averages_out(stack: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether the upper half of the spectrum of the mean is what the scatter of the periods (P, N, n) leaves."""
+    periods, samples, _ = stack.shape
+    coefficients = np.fft.rfft(stack, axis=1)[:, samples // 4 + 1 : samples // 2 + 1]
+    mean = coefficients.mean(axis=0)
+    scatter = (np.abs(coefficients - mean) ** 2).sum(axis=0) / (periods * (periods - 1))
+    floor = np.median(np.abs(mean) ** 2, axis=0) / np.log(2.0)
+    return np.asarray(floor <= AVERAGES_OUT * scatter.mean(axis=0), dtype=np.bool_)
 
 
 def _cheapest(noise: FloatArray, signal: FloatArray) -> int:
