@@ -279,18 +279,19 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     periods = len(data.per_period)
     tables = [np.column_stack([data.columns(motion, zero), extra]) / norms for motion, _ in data.per_period]
     torques = [tau for _, tau in data.per_period]
-    instruments = [data.answered(table) for table in tables]
-    table, torque, instrument = sum(tables) / periods, sum(torques) / periods, sum(instruments) / periods
-    own = sum(z.T @ t for z, t in zip(instruments, tables, strict=True)) / periods
-    side = sum(z.T @ tau for z, tau in zip(instruments, torques, strict=True)) / periods
-    gram = (periods * instrument.T @ table - own) / (periods - 1.0)
+    parts = [data.answered(table) for table in tables]
+    table, torque = sum(tables) / periods, sum(torques) / periods
+    instruments = np.asarray(sum(parts) / periods, dtype=np.float64)
+    own = sum(z.T @ t for z, t in zip(parts, tables, strict=True)) / periods
+    side = sum(z.T @ tau for z, tau in zip(parts, torques, strict=True)) / periods
+    gram = (periods * instruments.T @ table - own) / (periods - 1.0)
     if np.linalg.cond(gram) > 1e12:
-        gram, side = instrument.T @ table, instrument.T @ torque
+        gram, side = instruments.T @ table, instruments.T @ torque
         _tell_apart(data, table.T @ table)
     else:
-        side = (periods * instrument.T @ torque - side) / (periods - 1.0)
+        side = (periods * instruments.T @ torque - side) / (periods - 1.0)
     values = np.linalg.solve(gram, side) / norms
-    return values, np.linalg.solve(gram, instrument.T) / norms[:, None]
+    return values, np.linalg.solve(gram, instruments.T) / norms[:, None]
 
 
 def _tell_apart(data: _SpringData, gram: FloatArray) -> None:
