@@ -6,7 +6,7 @@ criterion decides how far to go. What a limit does between the grid points is ta
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -20,6 +20,7 @@ _BOUNDARY = 0.95
 _SMALLEST = 1e-8
 _OPEN = 1e6  # stands for a side without limit
 _INNER = 12
+_CORRECTIONS = 3
 _FAR = 0.25  # of the room at rest: a nonlinear wall with more slack takes no part in a step
 _INSET = 1e-6  # of the room between rest and limit: kept free
 
@@ -47,57 +48,100 @@ class Side:
     room: FloatArray
 
 
-def model_step(
-    gradient: FloatArray,
-    curvature: FloatArray,
-    tangents: Mapping[int, Tangent],
-    sides: Sequence[Side],
-    barrier: float,
-    shape: tuple[int, int],
-) -> tuple[FloatArray, list[FloatArray], float]:
-    """Maximise a quadratic model inside linearised walls.
+@dataclass(eq=False)
+class _Inner:
+    """Where the maximisation of a quadratic model stands.
 
-    Args:
+    Attributes:
+        step: (v,).
+        slacks: (r, M) of every side, as far as linearised walls tell.
+        forces: (r, M) multipliers of every side.
+        barrier: weight of the barrier.
+    """
+
+    step: FloatArray
+    slacks: list[FloatArray]
+    forces: list[FloatArray]
+    barrier: float
+
+
+@dataclass(frozen=True, eq=False)
+class _InnerProblem:
+    """A quadratic model inside linearised walls.
+
+    Attributes:
         gradient: (v,).
         curvature: (v, v), positive definite.
         tangents: the walls that are near, by index.
-        sides: their slacks and multipliers.
-        barrier: weight of the barrier to begin with.
+        sides: their slacks and multipliers at the beginning.
         shape: of the coefficients.
-
-    Returns:
-        (v,) step, multipliers after it, and the weight of the barrier reached.
     """
-    step = np.zeros(len(gradient))
-    far = [side.wall not in tangents for side in sides]
-    slacks = [side.slack for side in sides]
-    forces = [side.force for side in sides]
-    for _ in range(_INNER):
-        pushed = gradient - curvature @ step
-        walled = curvature.copy()
-        for k, tangent in tangents.items():
-            here = [j for j, side in enumerate(sides) if side.wall == k]
-            pushed -= tangent.pull(np.sum([sides[j].sign * barrier / slacks[j] for j in here], axis=0))
-            walled += tangent.curvature(np.sum([forces[j] / slacks[j] for j in here], axis=0))
+
+    gradient: FloatArray
+    curvature: FloatArray
+    tangents: Mapping[int, Tangent]
+    sides: Sequence[Side]
+    shape: tuple[int, int]
+
+    def advance(self, inner: _Inner, missing: Sequence[FloatArray] | None = None) -> float:
+        """One primal-dual step; what slacks are too large by is made up for.
+
+        Returns:
+            The part of the step that was taken.
+        """
+        slacks, forces, barrier = inner.slacks, inner.forces, inner.barrier
+        pushed = self.gradient - self.curvature @ inner.step
+        walled = self.curvature.copy()
+        for k, tangent in self.tangents.items():
+            here = [j for j, side in enumerate(self.sides) if side.wall == k]
+            stiffness = [forces[j] / slacks[j] for j in here]
+            push = [self.sides[j].sign * barrier / slacks[j] for j in here]
+            if missing is not None:
+                push += [self.sides[j].sign * stiff * missing[j] for j, stiff in zip(here, stiffness, strict=True)]
+            pushed -= tangent.pull(np.sum(push, axis=0))
+            walled += tangent.curvature(np.sum(stiffness, axis=0))
         change = scipy.linalg.solve(walled, pushed, assume_a="pos", check_finite=False)
-        moved = {k: tangent.push(change.reshape(shape)) for k, tangent in tangents.items()}
-        closings = [None if away else side.sign * moved[side.wall] for side, away in zip(sides, far, strict=True)]
-        length = min(
-            _fraction(slack, close) for slack, close in zip(slacks, closings, strict=True) if close is not None
-        )
-        step = step + length * change
-        for j, closing in enumerate(closings):
-            if closing is None:
-                continue
+        moved = {k: tangent.push(change.reshape(self.shape)) for k, tangent in self.tangents.items()}
+        closings = {j: side.sign * moved[side.wall] for j, side in enumerate(self.sides) if side.wall in self.tangents}
+        if missing is not None:
+            closings = {j: closing + missing[j] for j, closing in closings.items()}
+        length = min(_fraction(slacks[j], closing) for j, closing in closings.items())
+        inner.step = inner.step + length * change
+        for j, closing in closings.items():
             force = barrier / slacks[j] * (1.0 + closing * forces[j] / barrier)
             slacks[j] = slacks[j] - length * closing
             forces[j] = np.clip(force, 0.3 * barrier / slacks[j], 30.0 * barrier / slacks[j])
-        gain = float(gradient @ step - 0.5 * step @ curvature @ step)
-        if length > 0.8:
-            if barrier * len(gradient) < 0.1 * gain or barrier <= _SMALLEST:
+        return length
+
+    def solve(self, barrier: float) -> _Inner:
+        """Maximise, with this weight of the barrier to begin with."""
+        sides = self.sides
+        step = np.zeros(len(self.gradient))
+        inner = _Inner(step, [side.slack for side in sides], [side.force for side in sides], barrier)
+        for _ in range(_INNER):
+            length = self.advance(inner)
+            gain = float(self.gradient @ inner.step - 0.5 * inner.step @ self.curvature @ inner.step)
+            if length > 0.8:
+                if inner.barrier * len(self.gradient) < 0.1 * gain or inner.barrier <= _SMALLEST:
+                    break
+                inner.barrier = max(_SMALLEST, 0.2 * inner.barrier)
+        return inner
+
+    def correct(self, inner: _Inner, there: Sequence[Side]) -> FloatArray:
+        """(v,) the step once more, with what bends the walls on the way to its end.
+
+        Args:
+            inner: the step.
+            there: slacks that were found at its end.
+        """
+        missing = [slack - side.slack for slack, side in zip(inner.slacks, there, strict=True)]
+        bent = replace(inner, slacks=list(inner.slacks), forces=list(inner.forces))
+        for _ in range(_CORRECTIONS):
+            length = self.advance(bent, missing)
+            missing = [(1.0 - length) * part for part in missing]
+            if length > 0.99:
                 break
-            barrier = max(_SMALLEST, 0.2 * barrier)
-    return step, forces, barrier
+        return bent.step
 
 
 def raise_inside(
@@ -146,10 +190,18 @@ def raise_inside(
             damped = curvature + np.diag(damping * diagonal + 1e-9 * diagonal.max())
             for side, force in zip(sides, forces, strict=True):
                 side.force = np.clip(force, 0.3 * barrier / side.slack, 30.0 * barrier / side.slack)
-            step, stepped, reached = model_step(gradient, damped, tangents, sides, barrier, point.shape)
+            inner_problem = _InnerProblem(gradient, damped, tangents, sides, point.shape)
+            inner = inner_problem.solve(barrier)
+            step = inner.step
             predicted = float(gradient @ step - 0.5 * step @ damped @ step)
+            bend = np.zeros(len(step))
+            measured, worst = measure(walls, middle, point + step.reshape(point.shape))
+            if worst < 1.0:
+                bend = inner_problem.correct(inner, measured) - step
             for halvings in range(4):
-                placed = place_inside(walls, middle, centre, point + 0.4**halvings * step.reshape(point.shape))
+                part = 0.4**halvings
+                trial = point + (part * step + part**2 * bend).reshape(point.shape)
+                placed = (trial, measured) if worst >= 1.0 and halvings == 0 else place_inside(walls, middle, centre, trial)
                 if placed is not None:
                     there = information.model(placed[0])
                     found = criterion.value(there.matrix)
@@ -162,7 +214,7 @@ def raise_inside(
         assert placed is not None
         gain, value = found - value, found
         point, sides = placed
-        forces, barrier = stepped, reached
+        forces, barrier = inner.forces, inner.barrier
         damping = max(1e-6, damping * (0.3, 1.0, 4.0, 10.0)[halvings])
         if report is not None and report(value, point):
             break
@@ -198,28 +250,43 @@ def place_inside(
     factor = 1.0
     for _ in range(8):
         trial = centre + factor * (coefficients - centre)
-        sides: list[Side] = []
-        worst = 1.0
-        for k, wall in enumerate(walls):
-            value = wall.values(trial)
-            below, above = wall.overshoot(value)
-            for sign, bound, beyond in ((1.0, wall.upper, above), (-1.0, wall.lower, below)):
-                finite = np.where(np.isfinite(bound), bound, sign * _OPEN)
-                slack = sign * (finite - value) - beyond
-                room = sign * (finite - middle[k][:, :1])
-                tight = slack < _INSET * room
-                if np.any(tight):
-                    there = np.broadcast_to(room, slack.shape)[tight]
-                    worst = min(worst, float((there / (there - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
-                sides.append(Side(k, sign, finite, beyond, slack, slack, room))
-            if worst < 1.0:  # the costlier walls come later
-                break
+        sides, worst = measure(walls, middle, trial)
         if worst >= 1.0:
             return trial, sides
         factor *= worst
         if factor < 0.5:
             return None
     return None
+
+
+def measure(
+    walls: Sequence[Wall], middle: Sequence[FloatArray], coefficients: FloatArray
+) -> tuple[list[Side], float]:
+    """Slacks of a trajectory.
+
+    Args:
+        walls: the limits.
+        middle: their values at rest.
+        coefficients: (n, 2 L + 1) trajectory.
+
+    Returns:
+        Its slacks, and the factor by which it has to shrink toward rest so that they are positive, 1 if they are.
+    """
+    sides: list[Side] = []
+    worst = 1.0
+    for k, wall in enumerate(walls):
+        value = wall.values(coefficients)
+        below, above = wall.overshoot(value)
+        for sign, bound, beyond in ((1.0, wall.upper, above), (-1.0, wall.lower, below)):
+            finite = np.where(np.isfinite(bound), bound, sign * _OPEN)
+            slack = sign * (finite - value) - beyond
+            room = sign * (finite - middle[k][:, :1])
+            tight = slack < _INSET * room
+            if np.any(tight):
+                there = np.broadcast_to(room, slack.shape)[tight]
+                worst = min(worst, float((there / (there - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
+            sides.append(Side(k, sign, finite, beyond, slack, slack, room))
+    return sides, worst
 
 
 def _near(sides: Sequence[Side], wall: int) -> bool:
