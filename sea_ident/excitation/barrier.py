@@ -21,6 +21,8 @@ _SMALLEST = 1e-8
 _OPEN = 1e6  # stands for a side without limit
 _INNER = 12
 _CORRECTIONS = 3
+import os
+KLO,KHI,KMIN,KMAX = map(float, os.environ.get('KK', '0.5,2,0.25,16').split(','))
 _FAR = 0.25  # of the room at rest: a nonlinear wall with more slack takes no part in a step
 _INSET = 1e-6  # of the room between rest and limit: kept free
 
@@ -180,9 +182,10 @@ def raise_inside(
     there = information.model(point)
     value = criterion.value(there.matrix)
     forces = [barrier / side.slack for side in sides]
-    damping, small = 1e-3, 0
+    damping, stiffness, small = 1e-3, 1.0, 0
     for _ in range(iterations):
         gradient, curvature = quadratic_model(there, criterion)
+        curvature *= stiffness
         tangents = {k: wall.tangent(point) for k, wall in enumerate(walls) if _near(sides, k)}
         diagonal = np.diag(curvature).copy()
         found = -np.inf
@@ -213,6 +216,7 @@ def raise_inside(
                 damping *= 10.0
         assert placed is not None
         gain, value = found - value, found
+        stiffness = float(np.clip(stiffness * np.clip(2.0 - gain / predicted, KLO, KHI), KMIN, KMAX))
         point, sides = placed
         forces, barrier = inner.forces, inner.barrier
         damping = max(1e-6, damping * (0.3, 1.0, 4.0, 10.0)[halvings])
