@@ -118,7 +118,7 @@ class DynamicLimits:
         slopes = np.empty((3, len(x), model.nv, model.nv))
         for k in range(len(x)):
             slopes[0, k], slopes[1, k], slopes[2, k] = pin.computeRNEADerivatives(model, data, x[k], v[k], a[k])
-            torque[k] = data.tau
+            torque[k] = np.asarray(data.tau)
         return torque, tuple(part @ both for part in slopes)
 
     def smoothed(self, smoothing: FloatArray) -> "DynamicLimits":
