@@ -22,6 +22,7 @@ _INSET = 1e-6  # of the room between rest and limit: kept free
 # factor on the Gauss-Newton curvature, and by how much a step may change it
 _STIFFNESS = (0.25, 16.0)
 _STIFFER = (0.5, 2.0)
+_GRAIN = 1.0 / 16.0
 
 
 def raise_inside(
@@ -98,8 +99,10 @@ def raise_inside(
         assert placed is not None
         gain, value = found - value, found
         if predicted > 0.0:
-            # of the parabola that begins with the slope of the model and ends with the true gain
-            stiffness = float(np.clip(stiffness * np.clip(2.0 - gain / predicted, *_STIFFER), *_STIFFNESS))
+            # of the parabola that begins with the slope of the model and ends with the true gain; rounded, as the last
+            # digits of a gain would lead the ascent into another optimum
+            stiffer = float(np.clip(round((2.0 - gain / predicted) / _GRAIN) * _GRAIN, *_STIFFER))
+            stiffness = float(np.clip(stiffness * stiffer, *_STIFFNESS))
         point, sides = placed
         forces, barrier = solved.forces, solved.barrier
         damping = max(1e-6, damping * (0.3, 1.0, 4.0, 10.0)[halvings])

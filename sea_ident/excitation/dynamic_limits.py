@@ -86,8 +86,8 @@ class DynamicLimits:
         by_coordinate, by_state = self._torques(motion, derivatives)
         torque = by_coordinate @ self.fold
         slopes = np.zeros((len(motion), len(self), 3 * n if derivatives else 0))
-        for k, part in enumerate(by_state):
-            slopes[:, :, k * n : (k + 1) * n] = self.fold.T @ part
+        for k, by_motion in enumerate(by_state):
+            slopes[:, :, k * n : (k + 1) * n] = self.fold.T @ by_motion
         shifted = [np.zeros(n)] if shifts is None else list(shifts)
         torque, slopes = np.tile(torque, (1, len(shifted))), np.tile(slopes, (1, len(shifted), 1))
         for k, shift in enumerate(shifted):
@@ -110,7 +110,7 @@ class DynamicLimits:
         both = robot.link_map + robot.motor_map
         x = np.ascontiguousarray(motion.q @ both.T + robot.offset)
         v, a = np.ascontiguousarray(motion.dq @ both.T), np.ascontiguousarray(motion.ddq @ both.T)
-        data, torque = model.createData(), np.empty_like(x)
+        data, torque = model.createData(), np.empty(x.shape)
         if not derivatives:
             for k in range(len(x)):
                 torque[k] = pin.rnea(model, data, x[k], v[k], a[k])
@@ -118,7 +118,7 @@ class DynamicLimits:
         slopes = np.empty((3, len(x), model.nv, model.nv))
         for k in range(len(x)):
             slopes[0, k], slopes[1, k], slopes[2, k] = pin.computeRNEADerivatives(model, data, x[k], v[k], a[k])
-            torque[k] = np.asarray(data.tau)
+            torque[k] = data.tau
         return torque, tuple(part @ both for part in slopes)
 
     def smoothed(self, smoothing: FloatArray) -> "DynamicLimits":
