@@ -5,7 +5,8 @@ for the rigid case, one with friction), minimises the condition number of its ow
 differences, and keeps limits at its samples. Whatever it returns is judged here: log det and condition number of the
 columns that `design_excitation` is given, at 20 Hz, and how far it lies beyond the limits on a grid 50 times finer.
 
-    python tests/benchmarks/bench_excitation_figaroh.py [--seeds 3] [--first 0] [--iterations 200] [--case friction] [--ours]
+    python tests/benchmarks/bench_excitation_figaroh.py [--seeds 3] [--first 0] [--iterations 200] [--case friction]
+        [--ours]
 
 Says so and ends where FIGAROH and cyipopt are not installed (figaroh 1.0.2, cyipopt-wheels); with --ours only
 `design_excitation` runs. 200 iterations a segment are FIGAROH's own default. Times are processor times.
