@@ -2,102 +2,27 @@
 
 The criterion is replaced by its gradient and a Gauss-Newton curvature. A few primal-dual steps maximise that model
 inside all limits at once, each taken on a dense grid of times (linear limits cost next to nothing there); then the true
-criterion decides how far to go. What a limit does between the grid points is taken off it.
+criterion decides how far to go, and how stiff the model is to be in the next step: the curvature leaves out that of the
+columns and of the walls. What a limit does between the grid points is taken off it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
-import scipy.linalg
 
 from sea_ident._typing import FloatArray
 from sea_ident.excitation.criteria import Criterion
 from sea_ident.excitation.information import Information, LocalModel
-from sea_ident.excitation.walls import Tangent, Wall
+from sea_ident.excitation.model_step import Side, StepProblem
+from sea_ident.excitation.walls import Wall
 
-_BOUNDARY = 0.95
-_SMALLEST = 1e-8
 _OPEN = 1e6  # stands for a side without limit
-_INNER = 12
 _FAR = 0.25  # of the room at rest: a nonlinear wall with more slack takes no part in a step
 _INSET = 1e-6  # of the room between rest and limit: kept free
-
-
-@dataclass(eq=False)
-class Side:
-    """One side of a wall: slack = sign * (bound - value) - beyond > 0.
-
-    Attributes:
-        wall: index of the wall.
-        sign: 1 for the upper side, -1 for the lower.
-        bound: (r, 1) bounds.
-        beyond: (r, M) what the value does between the grid points.
-        slack: (r, M) distance.
-        force: (r, M) multipliers.
-        room: (r, 1) slack of the trajectory at rest.
-    """
-
-    wall: int
-    sign: float
-    bound: FloatArray
-    beyond: FloatArray
-    slack: FloatArray
-    force: FloatArray
-    room: FloatArray
-
-
-def model_step(
-    gradient: FloatArray,
-    curvature: FloatArray,
-    tangents: Mapping[int, Tangent],
-    sides: Sequence[Side],
-    barrier: float,
-    shape: tuple[int, int],
-) -> tuple[FloatArray, list[FloatArray], float]:
-    """Maximise a quadratic model inside linearised walls.
-
-    Args:
-        gradient: (v,).
-        curvature: (v, v), positive definite.
-        tangents: the walls that are near, by index.
-        sides: their slacks and multipliers.
-        barrier: weight of the barrier to begin with.
-        shape: of the coefficients.
-
-    Returns:
-        (v,) step, multipliers after it, and the weight of the barrier reached.
-    """
-    step = np.zeros(len(gradient))
-    far = [side.wall not in tangents for side in sides]
-    slacks = [side.slack for side in sides]
-    forces = [side.force for side in sides]
-    for _ in range(_INNER):
-        pushed = gradient - curvature @ step
-        walled = curvature.copy()
-        for k, tangent in tangents.items():
-            here = [j for j, side in enumerate(sides) if side.wall == k]
-            pushed -= tangent.pull(np.sum([sides[j].sign * barrier / slacks[j] for j in here], axis=0))
-            walled += tangent.curvature(np.sum([forces[j] / slacks[j] for j in here], axis=0))
-        change = scipy.linalg.solve(walled, pushed, assume_a="pos", check_finite=False)
-        moved = {k: tangent.push(change.reshape(shape)) for k, tangent in tangents.items()}
-        closings = [None if away else side.sign * moved[side.wall] for side, away in zip(sides, far, strict=True)]
-        length = min(
-            _fraction(slack, close) for slack, close in zip(slacks, closings, strict=True) if close is not None
-        )
-        step = step + length * change
-        for j, closing in enumerate(closings):
-            if closing is None:
-                continue
-            force = barrier / slacks[j] * (1.0 + closing * forces[j] / barrier)
-            slacks[j] = slacks[j] - length * closing
-            forces[j] = np.clip(force, 0.3 * barrier / slacks[j], 30.0 * barrier / slacks[j])
-        gain = float(gradient @ step - 0.5 * step @ curvature @ step)
-        if length > 0.8:
-            if barrier * len(gradient) < 0.1 * gain or barrier <= _SMALLEST:
-                break
-            barrier = max(_SMALLEST, 0.2 * barrier)
-    return step, forces, barrier
+# factor on the Gauss-Newton curvature, and by how much a step may change it
+_STIFFNESS = (0.25, 16.0)
+_STIFFER = (0.5, 2.0)
+_GRAIN = 1.0 / 16.0
 
 
 def raise_inside(
@@ -136,9 +61,10 @@ def raise_inside(
     there = information.model(point)
     value = criterion.value(there.matrix)
     forces = [barrier / side.slack for side in sides]
-    damping, small = 1e-3, 0
+    damping, stiffness, small = 1e-3, 1.0, 0
     for _ in range(iterations):
         gradient, curvature = quadratic_model(there, criterion)
+        curvature *= stiffness
         tangents = {k: wall.tangent(point) for k, wall in enumerate(walls) if _near(sides, k)}
         diagonal = np.diag(curvature).copy()
         found = -np.inf
@@ -146,10 +72,21 @@ def raise_inside(
             damped = curvature + np.diag(damping * diagonal + 1e-9 * diagonal.max())
             for side, force in zip(sides, forces, strict=True):
                 side.force = np.clip(force, 0.3 * barrier / side.slack, 30.0 * barrier / side.slack)
-            step, stepped, reached = model_step(gradient, damped, tangents, sides, barrier, point.shape)
+            problem = StepProblem(gradient, damped, tangents, sides, point.shape)
+            solved = problem.solve(barrier)
+            step, bend = solved.step, np.zeros(point.size)
             predicted = float(gradient @ step - 0.5 * step @ damped @ step)
+            end = point + step.reshape(point.shape)
+            reached, factor = measure(walls, middle, end)
+            if factor < 1.0:
+                bend = problem.correct(solved, reached) - step
             for halvings in range(4):
-                placed = place_inside(walls, middle, centre, point + 0.4**halvings * step.reshape(point.shape))
+                part = 0.4**halvings
+                if halvings == 0 and factor >= 1.0:
+                    placed = end, reached
+                else:
+                    trial = point + (part * step + part**2 * bend).reshape(point.shape)
+                    placed = place_inside(walls, middle, centre, trial)
                 if placed is not None:
                     there = information.model(placed[0])
                     found = criterion.value(there.matrix)
@@ -161,8 +98,13 @@ def raise_inside(
                 damping *= 10.0
         assert placed is not None
         gain, value = found - value, found
+        if predicted > 0.0:
+            # of the parabola that begins with the slope of the model and ends with the true gain; rounded, as the last
+            # digits of a gain would lead the ascent into another optimum
+            stiffer = float(np.clip(round((2.0 - gain / predicted) / _GRAIN) * _GRAIN, *_STIFFER))
+            stiffness = float(np.clip(stiffness * stiffer, *_STIFFNESS))
         point, sides = placed
-        forces, barrier = stepped, reached
+        forces, barrier = solved.forces, solved.barrier
         damping = max(1e-6, damping * (0.3, 1.0, 4.0, 10.0)[halvings])
         if report is not None and report(value, point):
             break
@@ -198,22 +140,7 @@ def place_inside(
     factor = 1.0
     for _ in range(8):
         trial = centre + factor * (coefficients - centre)
-        sides: list[Side] = []
-        worst = 1.0
-        for k, wall in enumerate(walls):
-            value = wall.values(trial)
-            below, above = wall.overshoot(value)
-            for sign, bound, beyond in ((1.0, wall.upper, above), (-1.0, wall.lower, below)):
-                finite = np.where(np.isfinite(bound), bound, sign * _OPEN)
-                slack = sign * (finite - value) - beyond
-                room = sign * (finite - middle[k][:, :1])
-                tight = slack < _INSET * room
-                if np.any(tight):
-                    there = np.broadcast_to(room, slack.shape)[tight]
-                    worst = min(worst, float((there / (there - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
-                sides.append(Side(k, sign, finite, beyond, slack, slack, room))
-            if worst < 1.0:  # the costlier walls come later
-                break
+        sides, worst = measure(walls, middle, trial)
         if worst >= 1.0:
             return trial, sides
         factor *= worst
@@ -222,14 +149,36 @@ def place_inside(
     return None
 
 
+def measure(walls: Sequence[Wall], middle: Sequence[FloatArray], coefficients: FloatArray) -> tuple[list[Side], float]:
+    """Slacks of a trajectory.
+
+    Args:
+        walls: the limits.
+        middle: their values at rest.
+        coefficients: (n, 2 L + 1) trajectory.
+
+    Returns:
+        Its slacks, and the factor by which it has to shrink toward rest so that they are positive, 1 if they are.
+    """
+    sides: list[Side] = []
+    worst = 1.0
+    for k, wall in enumerate(walls):
+        value = wall.values(coefficients)
+        below, above = wall.overshoot(value)
+        for sign, bound, beyond in ((1.0, wall.upper, above), (-1.0, wall.lower, below)):
+            finite = np.where(np.isfinite(bound), bound, sign * _OPEN)
+            slack = sign * (finite - value) - beyond
+            room = sign * (finite - middle[k][:, :1])
+            tight = slack < _INSET * room
+            if np.any(tight):
+                there = np.broadcast_to(room, slack.shape)[tight]
+                worst = min(worst, float((there / (there - slack[tight])).min()) * (1.0 - 2.0 * _INSET))
+            sides.append(Side(k, sign, finite, beyond, slack, slack, room))
+    return sides, worst
+
+
 def _near(sides: Sequence[Side], wall: int) -> bool:
     """Whether a wall is near enough to take part in a step; the first one, of linear limits, always is."""
     if wall == 0:
         return True
     return any(bool(np.any(side.slack < _FAR * side.room)) for side in sides if side.wall == wall)
-
-
-def _fraction(slack: FloatArray, closing: FloatArray) -> float:
-    """Largest part of a step that uses up no more than nearly all of any slack."""
-    worst = float((closing / slack).max(initial=0.0))
-    return 1.0 if worst <= _BOUNDARY else _BOUNDARY / worst

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
@@ -13,7 +14,6 @@ from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
 from sea_ident.exceptions import ExcitationError
-from sea_ident.excitation.bodies import BodyColumns
 from sea_ident.excitation.local_slopes import local_slopes
 from sea_ident.motion import Motion
 from sea_ident.robot import Limits, Robot
@@ -61,10 +61,6 @@ class DynamicLimits:
         return replace(self, bound=(1.0 - part) * self.bound)
 
     @cached_property
-    def _bodies(self) -> BodyColumns:
-        return BodyColumns.torque(self.robot.extended_model)
-
-    @cached_property
     def fold(self) -> FloatArray:
         """(nv, r) from torques of coordinates of the extended model to those that are limited."""
         robot = self.robot
@@ -86,16 +82,12 @@ class DynamicLimits:
             (N, r) torques (r more for every further shift), and their derivatives (N, r, 3 n) by q, q' and q'' (empty
             if not asked for).
         """
-        robot, n = self.robot, self.robot.n
-        both = robot.link_map + robot.motor_map
-        bodies = self._bodies.at(both @ motion.q.T + robot.offset[:, None], both @ motion.dq.T, both @ motion.ddq.T)
-        torque = bodies.columns()[:, 0].T @ self.fold
+        n = self.robot.n
+        by_coordinate, by_state = self._torques(motion, derivatives)
+        torque = by_coordinate @ self.fold
         slopes = np.zeros((len(motion), len(self), 3 * n if derivatives else 0))
-        if derivatives:
-            nv = both.shape[0]
-            folded = np.swapaxes(bodies.slopes()[:, :, 0], 1, 2) @ self.fold  # (N, 3 nv, r)
-            for k in range(3):
-                slopes[:, :, k * n : (k + 1) * n] = np.swapaxes(both.T @ folded[:, k * nv : (k + 1) * nv], 1, 2)
+        for k, by_motion in enumerate(by_state):
+            slopes[:, :, k * n : (k + 1) * n] = self.fold.T @ by_motion
         shifted = [np.zeros(n)] if shifts is None else list(shifts)
         torque, slopes = np.tile(torque, (1, len(shifted))), np.tile(slopes, (1, len(shifted), 1))
         for k, shift in enumerate(shifted):
@@ -111,6 +103,23 @@ class DynamicLimits:
                     if part is not None:
                         slopes[:, places, block * n + i] += (part @ friction.values)[:, None]
         return torque, slopes
+
+    def _torques(self, motion: Motion, derivatives: bool) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        """(N, nv) torques of the extended model, and (N, nv, n) their derivatives by q, q' and q'' if asked for."""
+        robot, model = self.robot, self.robot.extended_model
+        both = robot.link_map + robot.motor_map
+        x = np.ascontiguousarray(motion.q @ both.T + robot.offset)
+        v, a = np.ascontiguousarray(motion.dq @ both.T), np.ascontiguousarray(motion.ddq @ both.T)
+        data, torque = model.createData(), np.empty(x.shape)
+        if not derivatives:
+            for k in range(len(x)):
+                torque[k] = pin.rnea(model, data, x[k], v[k], a[k])
+            return torque, ()
+        slopes = np.empty((3, len(x), model.nv, model.nv))
+        for k in range(len(x)):
+            slopes[0, k], slopes[1, k], slopes[2, k] = pin.computeRNEADerivatives(model, data, x[k], v[k], a[k])
+            torque[k] = data.tau
+        return torque, tuple(part @ both for part in slopes)
 
     def smoothed(self, smoothing: FloatArray) -> "DynamicLimits":
         """The limits with friction that turns over within at least (n,) velocities [rad/s]."""

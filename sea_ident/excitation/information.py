@@ -12,7 +12,7 @@ from sea_ident.excitation.states import Sampling, SingleArray, StatePoint
 # Numbers held at once while derivatives are contracted (single precision).
 _CHUNK = 6_000_000
 # Samples per harmonic that the curvature is taken from: it only shapes the step.
-_CURVATURE_SAMPLES = 16
+_CURVATURE_SAMPLES = 12
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ _TOGETHER = 4
 _MOVED = 1.0 / 3.0
 _SHARE = 0.5
 # a move is given up if so many times its last gain would not bring it to the best
-_PATIENCE = 8.0
+_PATIENCE = 4.0
 
 
 @dataclass(frozen=True, eq=False)

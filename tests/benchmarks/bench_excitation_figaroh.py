@@ -5,9 +5,11 @@ for the rigid case, one with friction), minimises the condition number of its ow
 differences, and keeps limits at its samples. Whatever it returns is judged here: log det and condition number of the
 columns that `design_excitation` is given, at 20 Hz, and how far it lies beyond the limits on a grid 50 times finer.
 
-    python tests/benchmarks/bench_excitation_figaroh.py [--seeds 3] [--iterations 100] [--case friction]
+    python tests/benchmarks/bench_excitation_figaroh.py [--seeds 3] [--first 0] [--iterations 200] [--case friction]
+        [--ours]
 
-Says so and ends where FIGAROH and cyipopt are not installed (figaroh 1.0.2, cyipopt-wheels). Times are processor times.
+Says so and ends where FIGAROH and cyipopt are not installed (figaroh 1.0.2, cyipopt-wheels); with --ours only
+`design_excitation` runs. 200 iterations a segment are FIGAROH's own default. Times are processor times.
 """
 
 import argparse
@@ -21,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from bench_excitation_ur10 import limited
+from bench_excitation_ur10 import CASES, limited
 
 from sea_ident.effects import Effect, make_effect
 from sea_ident.excitation import DOptimality, design_excitation
@@ -145,11 +147,13 @@ class Figaroh:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--iterations", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--iterations", type=int, default=200)
     parser.add_argument("--case", default="")
+    parser.add_argument("--ours", action="store_true", help="without FIGAROH")
     chosen = parser.parse_args()
     missing = [name for name in ("figaroh", "cyipopt") if importlib.util.find_spec(name) is None]
-    if missing:
+    if missing and not chosen.ours:
         print(f"skipped: {' and '.join(missing)} not installed (pip install figaroh==1.0.2 cyipopt-wheels)")
         sys.exit(0)
     warnings.simplefilter("ignore")
@@ -160,8 +164,9 @@ def main() -> None:
         if chosen.case not in label:
             continue
         effects = columns_of(robot, friction)
-        period, harmonics, starts = (12.0, 5, 8) if friction else (24.0, 10, 6)
-        for seed in range(chosen.seeds):
+        period, harmonics = (12.0, 5) if friction else (24.0, 10)
+        starts = CASES[f"{label}, log det"][2]
+        for seed in range(chosen.first, chosen.first + chosen.seeds):
             begin = time.process_time()
             ours = design_excitation(
                 robot, base_frequency=1.0 / period, harmonics=harmonics, effects=effects, limits=limits, rate=20.0,
@@ -177,13 +182,15 @@ def main() -> None:
                 f"{spent:6.1f} s, beyond limits {over:+.1e}",
                 flush=True,
             )
+            if chosen.ours:
+                continue
             np.random.seed(seed)  # noqa: NPY002 (what FIGAROH draws from)
             begin = time.process_time()
             with tempfile.TemporaryDirectory() as folder:
                 found = Figaroh(robot, friction, chosen.iterations, Path(folder)).solve()
             spent = time.process_time() - begin
             if found is None:
-                print(f"{label:9s} seed {seed}: figaroh   returned nothing that keeps its limits, {spent:6.1f} s")
+                print(f"{label:9s} seed {seed}: figaroh   returned no trajectory, {spent:6.1f} s")
                 continue
             value, condition = judged(robot, effects, found[0])
             over = beyond(robot, limits, found[0])
