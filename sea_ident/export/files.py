@@ -61,7 +61,9 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
             joint = replace(joint, stiffness=stiffness, cubic_stiffness=cubic, damping=damping)
         joints.append(joint)
     notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
-    warnings = [] if physical.consistent else [physical.summary().splitlines()[0]]
+    warnings = []
+    if not physical.consistent:
+        (notes if physical.within_uncertainty else warnings).append(physical.verdict())
     inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
     return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside)), notes, warnings
 
@@ -114,5 +116,5 @@ def _write(path: str | Path, kind: str, text: str, notes: list[str], warnings: l
     except OutputError as error:
         raise ExportError(str(error)) from None
     for warning in warnings:
-        python_warnings.warn(f"{path}: {warning}", SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(warning, SeaIdentWarning, stacklevel=3)
     return Export(Path(path), kind, tuple(notes), tuple(warnings))

@@ -202,8 +202,12 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
 
 def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bool) -> float | None:
     """The period that the data show, with a note; the reference counts where there is one, as it has no noise."""
-    reference = [signals.others[kind] for kind in ("q_reference", "theta_reference") if kind in signals.others]
-    values = np.concatenate(reference, axis=1) if reference else signals.q
+    kinds = ("q_reference", "theta_reference")
+    reference = [
+        recording.channel(kind, [name]) for name in robot.joint_names for kind in kinds if recording.has(kind, name)
+    ]
+    complete = all(any(recording.has(kind, name) for kind in kinds) for name in robot.joint_names)
+    values = np.concatenate(reference, axis=1) if complete else signals.q
     time = recording.time
     if not uniform:
         grid = np.linspace(time[0], time[-1], len(time))
@@ -211,7 +215,7 @@ def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bo
         time = grid
     found = periods.detect_period(time, values)
     if found is not None:
-        signals.notes.append(f"period {found:.6g} s found from the {'reference' if reference else 'link positions'}")
+        signals.notes.append(f"period {found:.6g} s found from the {'reference' if complete else 'link positions'}")
     return found
 
 

@@ -70,9 +70,9 @@ def simulate(
         periods: number of recorded periods of a Fourier series.
         seed: of noise and jitter; equal seeds give equal results.
         sensors: noise and resolution; `SensorNoise()` by default, `SensorNoise.none()` for exact signals.
-        jitter: friction that varies from pass to pass; `FrictionJitter()` by default.
+        jitter: friction that varies from pass to pass, at all joints alike; `FrictionJitter.usual(robot)` by default.
         controller: `VelocityController()` by default, which applies the reference to the motors.
-        friction: Coulomb friction around zero speed, one law or one per joint; `SmoothCoulomb()` by default.
+        friction: Coulomb friction around zero speed, one law or one per joint; `SmoothCoulomb.usual(robot)` by default.
         plant: the true numbers; those of the robot's description by default.
         effects: what else acts.
         warm_up: temperature of the motors; not simulated by default.
@@ -103,7 +103,7 @@ def simulate(
     streams = np.random.SeedSequence(seed).spawn(2)
 
     # -- the closed loop
-    laws = _per_joint(robot, friction or SmoothCoulomb())
+    laws = _per_joint(robot, friction or SmoothCoulomb.usual(robot))
     motors = [
         law.start(float(viscous), float(coulomb), float(theta))
         for law, viscous, coulomb, theta in zip(
@@ -138,9 +138,9 @@ def simulate(
                 f"after {settling_periods} settling periods the motion still changes by {settled:.2g} (rad or m) from "
                 "one period to the next"
             )
-    vary = jitter or FrictionJitter()
+    varied = FrictionJitter.usual(robot) if jitter is None else (jitter,) * robot.n
     seeds = streams[0].spawn(robot.n)
-    system.replace_motor_friction([vary.on(f, child) for f, child in zip(motors, seeds, strict=True)])
+    system.replace_motor_friction([v.on(f, child) for v, f, child in zip(varied, motors, seeds, strict=True)])
     count = periods if follow.period is not None else 1
     tell = progress or (lambda done: None)
     tell(0)
