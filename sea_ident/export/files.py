@@ -61,7 +61,7 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
             joint = replace(joint, stiffness=stiffness, cubic_stiffness=cubic, damping=damping)
         joints.append(joint)
     notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
-    warnings = []
+    warnings: list[str] = []
     if not physical.consistent:
         (notes if physical.within_uncertainty else warnings).append(physical.verdict())
     inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
