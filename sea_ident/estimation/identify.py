@@ -254,11 +254,13 @@ def _check_signs(observations: Observations) -> list[str]:
         raise IdentificationError(
             f"{source}: the inertia comes out negative in every joint "
             f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
-            f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on)"
+            f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on). Or are the columns of "
+            "joints interchanged?"
         )
     return [
         f"{source}: the inertia that joint {name!r} moves comes out negative from its own torque: has that torque or "
-        f"current the wrong sign? Then exchange it ({_exchanged(name)}); the other joints are wrong with it"
+        f"current the wrong sign? Then exchange it ({_exchanged(name)}). Or is it that of another joint? The other "
+        "joints are wrong with it"
         for name in names
     ]
 
@@ -266,7 +268,7 @@ def _check_signs(observations: Observations) -> list[str]:
 def _exchanged(joint: str) -> str:
     column = f"tau_motor_{joint}"
     return (
-        f"ColumnSource({column!r}, sign=-1), on the command line --column {column}={column},sign=-1; likewise "
+        f"ColumnSource({column!r}, sign=-1), on the command line --column '{column}={column},sign=-1'; likewise "
         f"current_{joint} where there is no torque"
     )
 

@@ -10,6 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
+from sea_ident.processing.plausible import beyond_limits, doubts
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -191,7 +192,9 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
             "was measured that a model could explain. Are the columns the right ones?"
         )
     found.extend(source.warnings)
+    found.extend(doubts(recording, robot, q, theta, source.values))
     notes.extend(source.notes)
+    notes.extend(beyond_limits(recording, robot, q))
     others = {
         kind: recording.channel(kind, names) for kind in OTHER_CHANNELS if all(recording.has(kind, j) for j in names)
     }
@@ -238,7 +241,7 @@ def _periodic(
         )
     stacks = {"q": signals.q, "theta": signals.theta, "torque": signals.torque.values, **signals.others}
     cuts = {name: cut.stack(recording.time, values) for name, values in stacks.items()}
-    keep = _kept_periods(recording.source, cuts, found, notes)
+    keep = _kept_periods(recording.source, cuts, periods.holes(recording.time, cut), found, notes)
     cuts = {name: values[keep] for name, values in cuts.items()}
     count = len(keep)
     _check_periodicity(recording.source, robot, cuts["q"], period, found)
@@ -290,13 +293,27 @@ def _periodic(
     )
 
 
-def _kept_periods(source: str, cuts: dict[str, FloatArray], found: list[str], notes: list[str]) -> list[int]:
-    """Periods without transients and without copies of others."""
+def _kept_periods(
+    source: str, cuts: dict[str, FloatArray], holes: set[int], found: list[str], notes: list[str]
+) -> list[int]:
+    """Periods without transients, without gaps in time and without copies of others."""
     count = len(cuts["q"])
+    if len(holes) == count:
+        raise RecordingError(
+            f"{source}: every one of the {count} periods has a gap in time: nothing is filled in. Record without gaps, "
+            "or cut the recording to a part without any"
+        )
     drop = periods.leading_transients(np.concatenate([cuts["q"], cuts["theta"]], axis=2))
     if drop:
         notes.append(f"the first {drop} of {count} periods differ from the later ones and were left out as transient")
-    keep = list(range(drop, count))
+    keep = [p for p in range(drop, count) if p not in holes]
+    if not keep:
+        keep = [p for p in range(count) if p not in holes]
+    if holes:
+        found.append(
+            f"{source}: {len(holes)} of {count} periods have a gap in time and were left out: "
+            f"{', '.join(str(p + 1) for p in sorted(holes)[:10])}{' and others' if len(holes) > 10 else ''}"
+        )
     everything = np.concatenate([cuts[name][keep] for name in ("q", "theta", "torque")], axis=2)
     copies = [(keep[a], keep[b]) for a, b in periods.repeated_periods(everything)]
     if copies:

@@ -168,4 +168,6 @@ def _named(path: Path) -> Iterator[None]:
 
 
 def _unknown_suffix(path: Path) -> str:
-    return f"{path}: the suffix {path.suffix!r} is not known; there are {', '.join(SUFFIXES)}"
+    packed = path.suffix.lower() in (".gz", ".bz2", ".xz", ".zip", ".zst", ".7z")
+    what = "is a packed file; unpack it first. Read are" if packed else "is not known; there are"
+    return f"{path}: the suffix {path.suffix!r} {what} {', '.join(SUFFIXES)}"
