@@ -100,6 +100,7 @@ def conclude(
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
+        units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
         other_motion=held is not None and held.other_motion,
     )  # fmt: skip
     return Diagnosis(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from plants import Wave, from_parts, joint, link, modest_series, motor, quietly, ur10
 
-from sea_ident import FourierSeries, Motion, SeaIdentError, load_robot
+from sea_ident import FourierSeries, Motion, SeaIdentError, design_excitation, load_robot
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.regressor import inverse_dynamics
 from sea_ident.simulation import (
@@ -214,3 +214,15 @@ def test_friction_jitters_by_default(leg, leg_series, exact):
     varied = simulate(leg, leg_series, **options)
     alike = simulate(leg, leg_series, jitter=FrictionJitter.none(), **options)
     assert np.abs(varied.motion.theta - alike.motion.theta).max() > 1e-5
+
+
+def test_an_excitation_of_another_robot_is_refused(leg):
+    """As many joints, other names: its limits and its meaning are those of the other robot."""
+    other = from_parts(
+        '<link name="base"/>', link("one"), link("two"), link("three"),
+        joint("a", "base", "one", "0 1 0"), joint("b", "one", "two", "0 1 0"), joint("c", "two", "three", "0 1 0"),
+    )  # fmt: skip
+    excitation = design_excitation(leg, starts=1, harmonics=2)
+    with pytest.raises(SeaIdentError, match=r"designed for the joints hip, knee, ankle; test has a, b, c"):
+        simulate(other, excitation, periods=1)
+    assert simulate(leg, excitation, periods=1).periods == 1
