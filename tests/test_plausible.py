@@ -112,3 +112,15 @@ def test_coarse_current_is_not_called_saturated(leg, recording):
     values = recording.columns["tau_motor_hip"]
     step = np.ptp(values) / 12.0
     process(recording.replace_columns({"tau_motor_hip": step * np.round(values / step)}), leg, period=10.0)
+
+
+def test_a_torque_sensor_is_checked_and_said_to_be_unused(leg, recording):
+    deflection = recording.columns["theta_knee"] - recording.columns["q_knee"]
+    sound = recording.replace_columns({"tau_spring_knee": 200.0 * deflection})
+    assert found(leg, sound) == []
+    (note,) = [text for text in process(sound, leg, period=10.0).notes if "tau_spring_knee" in text]
+    assert "not used" in note
+    (said,) = found(leg, recording, tau_spring_knee=-200.0 * deflection)
+    assert "tau_spring_knee falls where the deflection rises" in said
+    (said,) = found(leg, recording, tau_spring_knee=np.full(recording.samples, 3.0))
+    assert "is the sensor dead" in said

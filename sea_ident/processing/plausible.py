@@ -51,6 +51,8 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
         sensors = [(f"q_{joint.name}", q[:, i])]
         if joint.elastic:
             found += _slope(joint, q[:, i], theta[:, i])
+            if recording.has("tau_spring", joint.name):
+                found += _sensor(joint, recording.channel("tau_spring", [joint.name])[:, 0], theta[:, i] - q[:, i])
             sensors.append((f"theta_{joint.name}", theta[:, i]))
         for k, (name, values) in enumerate(sensors):
             partner = sensors[1 - k] if joint.elastic else None
@@ -144,6 +146,27 @@ def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> list[str]:
     return [
         f"{where}, correlation {correlation:.2f}: are both of this joint, in one unit, and theta after the gear? The "
         "spring is between them, and all that is identified rests on it"
+    ]
+
+
+def _sensor(joint: Joint, torque: FloatArray, deflection: FloatArray) -> list[str]:
+    """Whether a measured spring torque follows the deflection."""
+    column = f"tau_spring_{joint.name}"
+    if np.ptp(torque) == 0.0:
+        return [f"{column} is constant, {torque[0]:g} {joint.torque_unit}: is the sensor dead? Leave it out"]
+    if np.ptp(deflection) > 0.0 and np.corrcoef(torque, deflection)[0, 1] < -0.5:
+        return [f"{column} falls where the deflection rises: has it the wrong sign? Then {_say(column, 'sign=-1')}"]
+    return []
+
+
+def unused(recording: Recording, robot: Robot) -> list[str]:
+    """Sentences about measured signals that the identification does not look at."""
+    measured = [f"tau_spring_{j.name}" for j in robot.joints if j.elastic and recording.has("tau_spring", j.name)]
+    if not measured:
+        return []
+    return [
+        f"{', '.join(measured)}: not used here, where springs follow from the motor torque; identify_measured_springs fits "
+        "them to the measured torque"
     ]
 
 

@@ -10,7 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
-from sea_ident.processing.plausible import beyond_limits, doubts
+from sea_ident.processing.plausible import beyond_limits, doubts, unused
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -194,7 +194,7 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
     found.extend(source.warnings)
     found.extend(doubts(recording, robot, q, theta, source.values))
     notes.extend(source.notes)
-    notes.extend(beyond_limits(recording, robot, q))
+    notes.extend([*beyond_limits(recording, robot, q), *unused(recording, robot)])
     others = {
         kind: recording.channel(kind, names) for kind in OTHER_CHANNELS if all(recording.has(kind, j) for j in names)
     }
