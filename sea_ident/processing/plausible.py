@@ -165,8 +165,8 @@ def unused(recording: Recording, robot: Robot) -> list[str]:
     if not measured:
         return []
     return [
-        f"{', '.join(measured)}: not used here, where springs follow from the motor torque; identify_measured_springs fits "
-        "them to the measured torque"
+        f"{', '.join(measured)}: not used here, where springs follow from the motor torque; "
+        "identify_measured_springs fits them to the measured torque"
     ]
 
 
