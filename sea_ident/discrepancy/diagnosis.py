@@ -88,7 +88,7 @@ class Diagnosis:
             first, second = self.next_experiment.separates
             lines.append(f"  next experiment: tells {first} from {second} {self.next_experiment.gain:.3g} times better")
         lines.extend(
-            f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.1f}" for x in self.locations[:5]
+            f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.4g}" for x in self.locations[:5]
         )
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
