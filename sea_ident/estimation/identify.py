@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
 from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.base import Side
@@ -86,6 +87,10 @@ def identify(
         RecordingError: the recording lacks what is needed.
         IdentificationError: the data do not determine the model, or contradict its physics in every joint.
     """
+    expect(robot, "identify: robot", Robot)
+    expect(recording, "identify: recording", Recording, ProcessedRecording)
+    for each in effects or ():
+        expect(each, "identify: each of effects", Effect)
     tell = progress or (lambda what, share: None)
     if isinstance(recording, ProcessedRecording):
         processed = recording

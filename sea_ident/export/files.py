@@ -4,6 +4,7 @@ import warnings as python_warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
 from sea_ident.estimation import Model, physical_parameters
 from sea_ident.exceptions import ExportError, OutputError, SeaIdentWarning
@@ -85,6 +86,7 @@ def export_urdf(model: Model, path: str | Path) -> Export:
         ExportError: if the model cannot be written as URDF, or the file cannot be written.
         IdentificationError: if no physically consistent parameters are found.
     """
+    expect(model, "export_urdf: model", Model)
     values, notes, warnings = model_values(model)
     text, remarks = urdf_text(values)
     return _write(path, "urdf", text, notes, [*warnings, *remarks])
@@ -104,6 +106,7 @@ def export_mjcf(model: Model, path: str | Path) -> Export:
         ExportError: if MuJoCo could not hold the model, or the file cannot be written.
         IdentificationError: if no physically consistent parameters are found.
     """
+    expect(model, "export_mjcf: model", Model)
     values, notes, warnings = model_values(model)
     text, remarks = mjcf_text(values)
     return _write(path, "mjcf", text, notes, [*warnings, *remarks])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
@@ -66,6 +67,8 @@ def process(
     Raises:
         RecordingError: a column is missing, the recording is shorter than one period, or nothing moves.
     """
+    expect(recording, "process: recording", Recording)
+    expect(robot, "process: robot", Robot)
     signals = _signals(recording, robot)
     uniform = recording.is_uniform
     if period is None:

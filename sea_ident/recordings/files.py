@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_directory, atomic_file
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.recordings.alignment import ClockAlignment
@@ -106,6 +107,7 @@ def write_recording(recording: Recording, path: str | Path) -> None:
         OutputError: the file cannot be written.
         MissingExtraError: the format needs a package that is not installed.
     """
+    expect(recording, "write_recording: recording", Recording)
     path = Path(path)
     check_suffix(path)
     suffix = path.suffix.lower()

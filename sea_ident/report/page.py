@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import sea_ident
+from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.estimation import Model
@@ -73,6 +74,7 @@ def write_report(
         OutputError: the file cannot be written.
         SeaIdentError: the excitation is one of other joints.
     """
+    expect(result, "write_report: result", Model, Diagnosis)
     model = result.model if isinstance(result, Diagnosis) else result
     if excitation is not None and model is not None and excitation.joint_names != model.robot.joint_names:
         raise SeaIdentError(

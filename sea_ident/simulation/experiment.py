@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.exceptions import SimulationError
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.recordings import Recording
@@ -89,6 +90,9 @@ def simulate(
     Raises:
         SimulationError: a number is missing, the reference does not fit, or the motion diverges.
     """
+    expect(robot, "simulate: robot", Robot)
+    for each in effects:
+        expect(each, "simulate: each of effects", PlantedEffect)
     if periods < 1 or not rate > 0.0 or not step > 0.0:
         raise SimulationError(f"periods {periods}, rate {rate} Hz and step {step} s must all be positive")
     check_planted(robot, effects)
