@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.estimation import Agreement, Model
 from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.observations import friction_is_modelled
@@ -108,6 +109,8 @@ def validate(
     Raises:
         RecordingError: a column is missing, or an external force acts throughout.
     """
+    expect(model, "validate: model", Model)
+    expect(recording, "validate: recording", Recording, ProcessedRecording)
     tell = progress or (lambda what, share: None)
     tell("averaging the periods", 0.0)
     if isinstance(recording, ProcessedRecording):

@@ -197,6 +197,13 @@ def test_an_exported_robot_is_a_robot_again(chain):
     assert record["rank"] == 16
 
 
+def test_an_export_in_two_formats_says_everything_once(chain, tmp_path):
+    done = call("export", chain[0] / "model.json", "--urdf", tmp_path / "a.urdf", "--mjcf", tmp_path / "a.xml")
+    said = (done.stdout + done.stderr).splitlines()
+    assert len(said) == len(set(said))
+    assert "what the data leave free" in done.stdout
+
+
 def test_a_report_needs_the_model_file_only(chain):
     text = (chain[0] / "again.html").read_text()
     assert 'id="excitation"' in text

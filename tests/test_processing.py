@@ -159,3 +159,15 @@ def test_a_motor_position_that_never_changes_is_named(leg, truth):
     recording = record(leg, truth, 2, torque_noise=0.1)
     with pytest.warns(SeaIdentWarning, match="theta_knee constant while q_knee moves"):
         process(recording.replace_columns({"theta_knee": np.full(4000, 0.1)}), leg, period=10.0)
+
+
+def test_period_is_that_of_the_reference_where_elastic_and_rigid_joints_mix(leg, truth):
+    """Elastic joints have a reference of the motor, rigid ones of the link: together they are one."""
+    recording = record(leg, truth, 6, torque_noise=0.2, encoder_noise=1e-6)
+    samples = np.arange(recording.samples)
+    kinds = ("theta_reference", "theta_reference", "q_reference")
+    wave = np.sin(2.0 * np.pi * samples / (recording.samples // 6))
+    reference = {f"{kind}_{name}": wave for kind, name in zip(kinds, leg.joint_names, strict=True)}
+    told = process(Recording(recording.time, {**recording.columns, **reference}, "test"), leg)
+    assert told.period == pytest.approx(10.0)
+    assert any("found from the reference" in note for note in told.notes)

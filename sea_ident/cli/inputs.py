@@ -167,6 +167,8 @@ def read_result(path: Path, model: Path | None) -> "Model | Diagnosis":
     from sea_ident.estimation import read_model
     from sea_ident.exceptions import ModelFileError, SeaIdentError
 
+    if not path.exists():
+        raise ModelFileError(f"{path}: no such file")
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:

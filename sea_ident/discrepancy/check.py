@@ -1,5 +1,6 @@
 """Checks at the border: recordings that prove nothing, clipped channels, spikes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.discrepancy.findings import Gap
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording
@@ -37,6 +39,28 @@ class Findings:
 
     warnings: tuple[str, ...] = ()
     fatal: bool = False
+
+
+def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float]) -> Findings:
+    """Findings with the joints whose noise is larger than their torque: of them, and with them, nothing can be told.
+
+    That happens where a joint hardly follows its motion, as one that friction holds: what its encoder then shows is
+    not what the model can be compared with, and every size is absorbed by noise.
+
+    Args:
+        findings: what was found before.
+        gap: of the recording.
+        torque: rms torque by joint [N m] or [N].
+    """
+    lost = [name for name, noise in gap.noise.items() if not noise < torque[name]]
+    if not lost:
+        return findings
+    text = (
+        f"the noise of {', '.join(lost)} comes out larger than the torque there: does the joint follow its motion in "
+        "every period, or does friction hold it? Nothing can be told of this recording; move that joint faster and "
+        "farther, or leave it out (joints, on the command line --joints)"
+    )
+    return Findings((*findings.warnings, text), fatal=True)
 
 
 def models_match(model: Model, reference: Model | None) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from sea_ident.arguments import expect
 from sea_ident.discrepancy.diagnose import diagnose
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Gap, Verdict
@@ -132,6 +133,8 @@ def close_gap(
         DiagnosisError: as `diagnose`, and if `rounds` is not positive.
         RecordingError: a recording lacks what is needed.
     """
+    expect(model, "close_gap: model", Model)
+    expect(recording, "close_gap: recording", Recording, ProcessedRecording)
     if rounds < 1:
         raise DiagnosisError(f"rounds is {rounds}; at least one diagnosis is needed")
     history: list[Diagnosis] = []

@@ -94,12 +94,14 @@ def conclude(
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     holds = held_gap is None or explains(gap, held_gap)
+    notes = check.drowned(notes, gap, _torque_by_joint(bench))
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
+        units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
         other_motion=held is not None and held.other_motion,
     )  # fmt: skip
     return Diagnosis(
@@ -131,6 +133,14 @@ def explains(training: Gap, held: Gap) -> bool:
     """Whether a gap that goes on one recording goes on the other too, where it is far beyond the noise."""
     left, noise = (float(np.linalg.norm(list(part.values()))) for part in (held.after, held.noise))
     return left < FAR_BEYOND * noise or training.shrink < GOES or held.shrink > STAYS * training.shrink
+
+
+def _torque_by_joint(bench: Bench) -> dict[str, float]:
+    """Largest rms torque of the equations of each joint [N m] or [N]."""
+    found: dict[str, float] = {}
+    for equation, rms in zip(bench.data.equations, bench.torque_rms, strict=True):
+        found[equation.joint] = max(found.get(equation.joint, 0.0), float(rms))
+    return found
 
 
 def verdict_of(

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
@@ -69,6 +70,8 @@ def diagnose(
         DiagnosisError: the recordings prove nothing (the same twice, another robot).
         RecordingError: a recording lacks what is needed.
     """
+    expect(model, "diagnose: model", Model)
+    expect(recording, "diagnose: recording", Recording, ProcessedRecording)
     tell = progress or (lambda what, share: None)
     tell("reading the periods", 0.0)
     robot = model.robot

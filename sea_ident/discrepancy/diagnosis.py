@@ -78,12 +78,17 @@ class Diagnosis:
                 lines.append(f"    or: {others}")
         gaps = {"training": self.training, "held out": self.holdout}
         gaps |= {f"forward simulation of {kind}": gap for kind, gap in self.simulation_gap.items()}
-        lines.extend(f"  gap, {label}: {gap.summary()}" for label, gap in gaps.items() if gap is not None)
+        positions = ("of q", "of theta")
+        lines.extend(
+            f"  gap [{'rad or m' if label.endswith(positions) else 'N m or N'}], {label}: {gap.summary()}"
+            for label, gap in gaps.items()
+            if gap is not None
+        )
         if self.next_experiment is not None:
             first, second = self.next_experiment.separates
             lines.append(f"  next experiment: tells {first} from {second} {self.next_experiment.gain:.3g} times better")
         lines.extend(
-            f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.1f}" for x in self.locations[:5]
+            f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.4g}" for x in self.locations[:5]
         )
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)

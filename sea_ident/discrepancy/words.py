@@ -1,5 +1,6 @@
 """A diagnosis in words."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.data import PeriodData
@@ -27,6 +28,7 @@ class Facts:
         p_value: of the lack of fit.
         trend: comparison of periods.
         change: against a reference.
+        units: unit of the torque of each joint.
         other_motion: whether the held-out data are another motion, not only other periods of the same.
     """
 
@@ -39,6 +41,7 @@ class Facts:
     p_value: float
     trend: TrendTest
     change: ParameterChange | None
+    units: Mapping[str, str]
     other_motion: bool = True
 
 
@@ -46,7 +49,7 @@ def paragraph(facts: Facts) -> str:
     """One paragraph that a person can act on."""
     parts = [_opening(facts)]
     if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
-        parts.append(_gap_sentence(facts.gap))
+        parts.append(_gap_sentence(facts.gap, facts.units))
         if facts.held is not None:
             parts.append(_held_sentence(facts))
     if facts.remainder > 0.0:
@@ -68,7 +71,7 @@ def slow_samples(data: PeriodData) -> str:
     )
 
 
-def _gap_sentence(gap: Gap) -> str:
+def _gap_sentence(gap: Gap, units: Mapping[str, str]) -> str:
     """The gap on the recording, where it was largest; where it is below the noise, what that means."""
     worst = max(gap.before, key=lambda j: gap.before[j])
     if gap.before[worst] <= 0.0:
@@ -76,8 +79,8 @@ def _gap_sentence(gap: Gap) -> str:
             "It is smaller than the noise of the mean torque in every joint: the pattern over the period shows it, the "
             "size of the residual does not, and no prediction gets much better by it."
         )
-    after = gap.after[worst]
-    to = f"to {after:.3g} N m" if after > 0.0 else f"to nothing beyond the noise ({gap.noise[worst]:.2g} N m)"
+    after, unit = gap.after[worst], units[worst]
+    to = f"to {after:.3g} {unit}" if after > 0.0 else f"to nothing beyond the noise ({gap.noise[worst]:.2g} {unit})"
     return f"With it the gap on this recording goes from {gap.before[worst]:.3g} {to} at {worst}, where it was largest."
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
 from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.base import Side
@@ -86,6 +87,10 @@ def identify(
         RecordingError: the recording lacks what is needed.
         IdentificationError: the data do not determine the model, or contradict its physics in every joint.
     """
+    expect(robot, "identify: robot", Robot)
+    expect(recording, "identify: recording", Recording, ProcessedRecording)
+    for each in effects or ():
+        expect(each, "identify: each of effects", Effect)
     tell = progress or (lambda what, share: None)
     if isinstance(recording, ProcessedRecording):
         processed = recording
@@ -254,11 +259,13 @@ def _check_signs(observations: Observations) -> list[str]:
         raise IdentificationError(
             f"{source}: the inertia comes out negative in every joint "
             f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
-            f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on)"
+            f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on). Or are the columns of "
+            "joints interchanged?"
         )
     return [
         f"{source}: the inertia that joint {name!r} moves comes out negative from its own torque: has that torque or "
-        f"current the wrong sign? Then exchange it ({_exchanged(name)}); the other joints are wrong with it"
+        f"current the wrong sign? Then exchange it ({_exchanged(name)}). Or is it that of another joint? The other "
+        "joints are wrong with it"
         for name in names
     ]
 
@@ -266,7 +273,7 @@ def _check_signs(observations: Observations) -> list[str]:
 def _exchanged(joint: str) -> str:
     column = f"tau_motor_{joint}"
     return (
-        f"ColumnSource({column!r}, sign=-1), on the command line --column {column}={column},sign=-1; likewise "
+        f"ColumnSource({column!r}, sign=-1), on the command line --column '{column}={column},sign=-1'; likewise "
         f"current_{joint} where there is no torque"
     )
 

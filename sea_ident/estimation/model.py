@@ -223,8 +223,8 @@ class Model:
     def summary(self) -> str:
         """Parameters with intervals, springs, fit and warnings."""
         lines = [
-            f"{self.robot.name}: {self.base.rank} base parameters by {self.estimator} from {self.fit.periods} "
-            f"period(s) of {self.recording}",
+            f"{self.robot.name}: {self.base.rank} base parameters by {self.estimator} from "
+            f"{self.fit.periods} {'period' if self.fit.periods == 1 else 'periods'} of {self.recording}",
             f"  condition number {self.fit.condition_number:.4g}, log det F'F {self.fit.log_det:.5g}, weighted "
             f"{self.fit.log_det_weighted:.5g}; standard deviations: {self.covariance_kind}",
         ]
@@ -232,12 +232,14 @@ class Model:
         half = self.uncertainty.half_width()
         for name, value, std, wide, unit in zip(self.names, self.values, self.std, half, self.base.units, strict=True):
             lines.append(f"  {name:<{width}}  {value:>12.6g} +- {std:<10.3g} 95 %: +- {wide:<10.3g} {unit}")
+        if any(name.endswith("*") for name in self.names):
+            lines.append("  * and other parameters that only act together with it: `sea-ident inspect` lists which")
         lines.extend(f"  spring {spring.summary()}" for spring in self.springs)
         near = None if self.fit.agreement is None else self.fit.agreement.words()
-        for i, name in enumerate(self.robot.joint_names):
+        for i, joint in enumerate(self.robot.joints):
             lines.append(
-                f"  {name}: residual {self.fit.rms_residual[i]:.4g}, noise {self.fit.noise_std[i]:.4g}, torque "
-                f"{self.fit.rms_torque[i]:.4g} (rms){'' if near is None else near[i]}"
+                f"  {joint.name}: residual {self.fit.rms_residual[i]:.4g}, noise {self.fit.noise_std[i]:.4g}, torque "
+                f"{self.fit.rms_torque[i]:.4g} {joint.torque_unit} (rms){'' if near is None else near[i]}"
             )
         if self.update is not None:
             lines.extend(f"  {line}" for line in self.update.summary().splitlines())

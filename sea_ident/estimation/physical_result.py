@@ -14,6 +14,10 @@ CONSISTENT = 1e-3
 """Largest shift of a base parameter, in its standard deviations, that is rounding of the solver."""
 
 
+WITHIN = 2.0
+"""Shift of a base parameter, in its standard deviations, that noise explains."""
+
+
 class Pull(StrEnum):
     """What draws the free directions toward the description."""
 
@@ -55,6 +59,29 @@ class PhysicalParameters:
         """Whether the identified base parameters are those of real bodies as they stand."""
         return bool(np.all(np.abs(self.shift_in_std) < CONSISTENT))
 
+    @property
+    def within_uncertainty(self) -> bool:
+        """Whether real bodies have base parameters that the data cannot tell from the identified ones."""
+        return bool(np.all(np.abs(self.shift_in_std) <= WITHIN))
+
+    def verdict(self) -> str:
+        """One sentence on whether data and physics agree."""
+        if self.consistent:
+            return "the identified base parameters are those of real bodies"
+        worst = int(np.argmax(np.abs(self.shift_in_std)))
+        name, unit = self.model.names[worst], self.model.base.units[worst]
+        identified = self.base_values[worst] - self.shift[worst]
+        moved = (
+            f"most of all {name} from {identified:.4g} to {self.base_values[worst]:.4g} {unit}, "
+            f"{abs(self.shift_in_std[worst]):.2g} standard deviations"
+        )
+        if self.within_uncertainty:
+            return f"base parameters moved to those of real bodies, within their uncertainty: {moved}"
+        return (
+            f"no real bodies have the identified base parameters; those of the nearest are taken: {moved} (chi square "
+            f"{self.chi_square:.3g}). Something is wrong in the model or the data: `diagnose` looks for it"
+        )
+
     def named(self) -> dict[str, float]:
         """Values by name."""
         return {column.name: float(v) for column, v in zip(self.columns, self.values, strict=True)}
@@ -89,14 +116,8 @@ class PhysicalParameters:
 
     def summary(self) -> str:
         """Whether data and physics agree, and the parameters."""
-        if self.consistent:
-            lines = ["the identified base parameters are those of real bodies"]
-        else:
-            worst = int(np.argmax(np.abs(self.shift_in_std)))
-            lines = [
-                f"no real bodies have the identified base parameters: {self.model.names[worst]} had to move by "
-                f"{self.shift_in_std[worst]:.2g} standard deviations (chi square {self.chi_square:.3g})"
-            ]
+        lines = [self.verdict()]
+        if not self.consistent:
             if self.bodies:
                 lines.append(f"  bodies that hold back: {', '.join(self.bodies)}")
             if self.limited:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.effects import Effect
 from sea_ident.exceptions import ExcitationError, SeaIdentWarning
 from sea_ident.excitation.board import Progress
@@ -79,6 +80,7 @@ def design_excitation(
         InfeasibleError: limits exclude each other.
         ExcitationError: other input that cannot be used.
     """
+    expect(robot, "design_excitation: robot", Robot)
     begin = time.perf_counter()
     for name, number in (("harmonics", harmonics), ("starts", starts), ("seed", seed), ("jobs", jobs)):
         _check_whole(name, number, least=-np.inf if name == "jobs" else 0)

@@ -4,6 +4,7 @@ import warnings as python_warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
 from sea_ident.estimation import Model, physical_parameters
 from sea_ident.exceptions import ExportError, OutputError, SeaIdentWarning
@@ -61,7 +62,9 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
             joint = replace(joint, stiffness=stiffness, cubic_stiffness=cubic, damping=damping)
         joints.append(joint)
     notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
-    warnings = [] if physical.consistent else [physical.summary().splitlines()[0]]
+    warnings: list[str] = []
+    if not physical.consistent:
+        (notes if physical.within_uncertainty else warnings).append(physical.verdict())
     inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
     return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside)), notes, warnings
 
@@ -83,6 +86,7 @@ def export_urdf(model: Model, path: str | Path) -> Export:
         ExportError: if the model cannot be written as URDF, or the file cannot be written.
         IdentificationError: if no physically consistent parameters are found.
     """
+    expect(model, "export_urdf: model", Model)
     values, notes, warnings = model_values(model)
     text, remarks = urdf_text(values)
     return _write(path, "urdf", text, notes, [*warnings, *remarks])
@@ -102,6 +106,7 @@ def export_mjcf(model: Model, path: str | Path) -> Export:
         ExportError: if MuJoCo could not hold the model, or the file cannot be written.
         IdentificationError: if no physically consistent parameters are found.
     """
+    expect(model, "export_mjcf: model", Model)
     values, notes, warnings = model_values(model)
     text, remarks = mjcf_text(values)
     return _write(path, "mjcf", text, notes, [*warnings, *remarks])
@@ -114,5 +119,5 @@ def _write(path: str | Path, kind: str, text: str, notes: list[str], warnings: l
     except OutputError as error:
         raise ExportError(str(error)) from None
     for warning in warnings:
-        python_warnings.warn(f"{path}: {warning}", SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(warning, SeaIdentWarning, stacklevel=3)
     return Export(Path(path), kind, tuple(notes), tuple(warnings))

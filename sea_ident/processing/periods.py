@@ -62,7 +62,7 @@ def mismatch(values: FloatArray) -> FloatArray:
     lags = samples - max(samples // 4, 1)
     total = np.zeros(lags)
     columns = [column - column.mean() for column in values.T]
-    columns = [column / column.std() for column in columns if column.std() > 0.0]
+    columns = [column / column.std() for column in columns if np.ptp(column) > 0.0]
     size = 1 << int(np.ceil(np.log2(2 * samples)))
     count = samples - np.arange(lags)
     for column in columns:
@@ -95,14 +95,14 @@ def detect_period(time: FloatArray, values: FloatArray) -> float | None:
     interval = float((time[-1] - time[0]) / (len(time) - 1))
     thin = max(1, len(time) // 200_000)
     values, interval = values[::thin], interval * thin
-    if not np.any(values.std(axis=0) > 0.0):
+    if not np.any(np.ptp(values, axis=0) > 0.0):
         return None
     lag = _first_repeat(mismatch(values))
     if lag is None:
         return None
     if len(values) >= 3 * lag:
         values = values[lag:]
-    error, moving = mismatch(values), values.std(axis=0) > 0.0
+    error, moving = mismatch(values), np.ptp(values, axis=0) > 0.0
     repeats = len(values) / lag
     last = max(int(repeats / 2.0), min(2, int(repeats - 0.5)), 1)
     period, differences = float(lag), []
@@ -190,6 +190,26 @@ def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> 
     if start < time[0]:
         start = float(time[0])
     return Cut(period, samples, periods, -1, start)
+
+
+GAP = 0.02
+"""Share of a period that may be without samples: motion of many harmonics is not known within a longer gap."""
+
+
+def holes(time: FloatArray, cut: Cut) -> set[int]:
+    """Periods that a gap in time reaches into.
+
+    Args:
+        time: (M,) [s].
+        cut: where the periods lie.
+    """
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > max(GAP * cut.period, 3.0 * float(np.median(steps))))
+    found: set[int] = set()
+    for k in gaps:
+        first, last = ((time[[k, k + 1]] - cut.start) / cut.period).tolist()
+        found.update(range(max(int(np.floor(first)), 0), min(int(np.floor(last)), cut.periods - 1) + 1))
+    return found
 
 
 def leading_transients(stack: FloatArray) -> int:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
+from sea_ident.processing.plausible import beyond_limits, doubts, unused
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -65,6 +67,8 @@ def process(
     Raises:
         RecordingError: a column is missing, the recording is shorter than one period, or nothing moves.
     """
+    expect(recording, "process: recording", Recording)
+    expect(robot, "process: robot", Robot)
     signals = _signals(recording, robot)
     uniform = recording.is_uniform
     if period is None:
@@ -191,7 +195,9 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
             "was measured that a model could explain. Are the columns the right ones?"
         )
     found.extend(source.warnings)
+    found.extend(doubts(recording, robot, q, theta, source.values))
     notes.extend(source.notes)
+    notes.extend([*beyond_limits(recording, robot, q), *unused(recording, robot)])
     others = {
         kind: recording.channel(kind, names) for kind in OTHER_CHANNELS if all(recording.has(kind, j) for j in names)
     }
@@ -202,8 +208,12 @@ def _signals(recording: Recording, robot: Robot) -> _Signals:
 
 def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bool) -> float | None:
     """The period that the data show, with a note; the reference counts where there is one, as it has no noise."""
-    reference = [signals.others[kind] for kind in ("q_reference", "theta_reference") if kind in signals.others]
-    values = np.concatenate(reference, axis=1) if reference else signals.q
+    kinds = ("q_reference", "theta_reference")
+    reference = [
+        recording.channel(kind, [name]) for name in robot.joint_names for kind in kinds if recording.has(kind, name)
+    ]
+    complete = all(any(recording.has(kind, name) for kind in kinds) for name in robot.joint_names)
+    values = np.concatenate(reference, axis=1) if complete else signals.q
     time = recording.time
     if not uniform:
         grid = np.linspace(time[0], time[-1], len(time))
@@ -211,7 +221,7 @@ def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bo
         time = grid
     found = periods.detect_period(time, values)
     if found is not None:
-        signals.notes.append(f"period {found:.6g} s found from the {'reference' if reference else 'link positions'}")
+        signals.notes.append(f"period {found:.6g} s found from the {'reference' if complete else 'link positions'}")
     return found
 
 
@@ -234,7 +244,7 @@ def _periodic(
         )
     stacks = {"q": signals.q, "theta": signals.theta, "torque": signals.torque.values, **signals.others}
     cuts = {name: cut.stack(recording.time, values) for name, values in stacks.items()}
-    keep = _kept_periods(recording.source, cuts, found, notes)
+    keep = _kept_periods(recording.source, cuts, periods.holes(recording.time, cut), found, notes)
     cuts = {name: values[keep] for name, values in cuts.items()}
     count = len(keep)
     _check_periodicity(recording.source, robot, cuts["q"], period, found)
@@ -286,13 +296,27 @@ def _periodic(
     )
 
 
-def _kept_periods(source: str, cuts: dict[str, FloatArray], found: list[str], notes: list[str]) -> list[int]:
-    """Periods without transients and without copies of others."""
+def _kept_periods(
+    source: str, cuts: dict[str, FloatArray], holes: set[int], found: list[str], notes: list[str]
+) -> list[int]:
+    """Periods without transients, without gaps in time and without copies of others."""
     count = len(cuts["q"])
+    if len(holes) == count:
+        raise RecordingError(
+            f"{source}: every one of the {count} periods has a gap in time: nothing is filled in. Record without gaps, "
+            "or cut the recording to a part without any"
+        )
     drop = periods.leading_transients(np.concatenate([cuts["q"], cuts["theta"]], axis=2))
     if drop:
         notes.append(f"the first {drop} of {count} periods differ from the later ones and were left out as transient")
-    keep = list(range(drop, count))
+    keep = [p for p in range(drop, count) if p not in holes]
+    if not keep:
+        keep = [p for p in range(count) if p not in holes]
+    if holes:
+        found.append(
+            f"{source}: {len(holes)} of {count} periods have a gap in time and were left out: "
+            f"{', '.join(str(p + 1) for p in sorted(holes)[:10])}{' and others' if len(holes) > 10 else ''}"
+        )
     everything = np.concatenate([cuts[name][keep] for name in ("q", "theta", "torque")], axis=2)
     copies = [(keep[a], keep[b]) for a, b in periods.repeated_periods(everything)]
     if copies:

@@ -12,6 +12,9 @@ from sea_ident.robot import Robot
 SATURATED_SHARE = 0.005
 """Share of the samples at the very extreme of a current from which on it is called saturated."""
 
+COARSE = 50
+"""Different values of a torque below which every top is flat, cut or not."""
+
 
 @dataclass(frozen=True, eq=False)
 class TorqueSource:
@@ -95,6 +98,8 @@ def transmitted(torque: FloatArray, efficiency: FloatArray, direction: FloatArra
 
 
 def _saturation(values: FloatArray, column: str, source: str) -> str:
+    if 1 < len(np.unique(values)) < COARSE:
+        return ""
     for extreme, side in ((values.max(), "highest"), (values.min(), "lowest")):
         if values.max() == values.min():
             return (

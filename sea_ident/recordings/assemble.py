@@ -142,12 +142,25 @@ def _absent(name: str, target: str, table: RawTable, source: str) -> str:
 
 
 def _no_time(table: RawTable, source: str) -> str:
-    near = [name for name in (*table.columns, *table.left_out) if _TIME_ELSEWHERE.match(name.strip().lower())]
+    near = [name for name in (*table.columns, *table.left_out) if _TIME_ELSEWHERE.match(_last(name).strip().lower())]
     example = near[0] if near else "<name in the file>"
+    inside = {_prefix(name) for name in table.columns}
+    group = inside.pop() if len(inside) == 1 else ""
+    more = f", and likewise --column 'q_*={group}q_*' and so on" if group else ""
     return (
         f"{source}: no column 'time'. If it has another name, say columns={{'time': {example!r}}}, on the command line "
-        f"--column 'time={example}' (its unit too, if it is not s: ,unit=ms). There are: {_all(table)}"
+        f"--column 'time={example}' (its unit too, if it is not s: ,unit=ms){more}. There are: {_all(table)}"
     )
+
+
+def _prefix(name: str) -> str:
+    """The groups or structures that a column is in."""
+    return name[: len(name) - len(_last(name))]
+
+
+def _last(name: str) -> str:
+    """The name of a column without the groups or structures that it is in."""
+    return re.split(r"[./]", name)[-1]
 
 
 def _all(table: RawTable) -> str:

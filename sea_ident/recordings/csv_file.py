@@ -128,8 +128,8 @@ def _check_header(header: list[str], row: str, line: int, path: Path) -> None:
         for delimiter, name in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
             if delimiter in row:
                 raise RecordingError(
-                    f"{where}: the columns are separated by {name}; commas are needed (and decimal points). "
-                    f"Export again, or replace {delimiter!r} by ','"
+                    f"{where}: the columns are separated by {name}; commas are needed, and decimal points. "
+                    f"Export again, or replace decimal commas by '.' where there are any, then {delimiter!r} by ','"
                 )
     if len(header) > MOST_COLUMNS:
         raise RecordingError(f"{where}: {len(header)} columns; at most {MOST_COLUMNS} are read")
@@ -194,7 +194,10 @@ def _number(cell: str, name: str, where: str) -> float:
             "clocks of their own, write them to a format with columns of different length (NPZ, MAT, HDF5)"
         )
     if not _is_number(text):
-        raise RecordingError(f"{where}: column {name} holds {text[:60]!r} instead of a number")
+        raise RecordingError(
+            f"{where}: column {name} holds {text[:60]!r} instead of a number; remove rows that hold none, as one "
+            "of units"
+        )
     return float(text)
 
 

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_directory, atomic_file
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.recordings.alignment import ClockAlignment
@@ -106,6 +107,7 @@ def write_recording(recording: Recording, path: str | Path) -> None:
         OutputError: the file cannot be written.
         MissingExtraError: the format needs a package that is not installed.
     """
+    expect(recording, "write_recording: recording", Recording)
     path = Path(path)
     check_suffix(path)
     suffix = path.suffix.lower()
@@ -168,4 +170,6 @@ def _named(path: Path) -> Iterator[None]:
 
 
 def _unknown_suffix(path: Path) -> str:
-    return f"{path}: the suffix {path.suffix!r} is not known; there are {', '.join(SUFFIXES)}"
+    packed = path.suffix.lower() in (".gz", ".bz2", ".xz", ".zip", ".zst", ".7z")
+    what = "is a packed file; unpack it first. Read are" if packed else "is not known; there are"
+    return f"{path}: the suffix {path.suffix!r} {what} {', '.join(SUFFIXES)}"

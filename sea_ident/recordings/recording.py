@@ -183,7 +183,9 @@ class Recording:
         return tuple(text for text in self.warnings if text not in found)
 
     def _absent(self, name: str, joint: str) -> str:
-        near = get_close_matches(name, self.columns, n=1, cutoff=0.8)
+        # a column of this project's names that is another joint's is meant as that
+        foreign = [column for column in self.columns if (split_name(column) or ("", ""))[1] not in self.joints]
+        near = get_close_matches(name, foreign, n=1, cutoff=0.8)
         hint = f" Did you mean {near[0]}?" if near else ""
         return (
             f"{self.source}: joint {joint!r} needs column {name}, which is absent.{hint} "
@@ -293,8 +295,10 @@ def _warnings(time: FloatArray, columns: Mapping[str, FloatArray], source: str) 
             f"(time {time[k]:g} s), where the median interval is {median:g} s"
         )
     if median >= 0.5:
+        unit, name = ("ms", "milliseconds") if median < 100.0 else ("us", "microseconds")
+        unit, name = (unit, name) if median < 1e5 else ("ns", "nanoseconds")
         found.append(
-            f"{source}: the median interval is {median:g} s; if time is in milliseconds, say "
-            "columns={'time': ColumnSource('time', unit='ms')}"
+            f"{source}: the median interval is {median:g} s; if time is in {name}, say columns={{'time': "
+            f"ColumnSource('time', unit='{unit}')}}, on the command line --column time=time,unit={unit}"
         )
     return found

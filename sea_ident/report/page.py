@@ -10,9 +10,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import sea_ident
+from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.estimation import Model
+from sea_ident.exceptions import SeaIdentError
 from sea_ident.excitation import Excitation
 from sea_ident.report.content import Content
 from sea_ident.report.section import DiagnosisSection, ModelSection
@@ -70,7 +72,15 @@ def write_report(
 
     Raises:
         OutputError: the file cannot be written.
+        SeaIdentError: the excitation is one of other joints.
     """
+    expect(result, "write_report: result", Model, Diagnosis)
+    model = result.model if isinstance(result, Diagnosis) else result
+    if excitation is not None and model is not None and excitation.joint_names != model.robot.joint_names:
+        raise SeaIdentError(
+            f"the excitation is one of {', '.join(excitation.joint_names)}, the model one of "
+            f"{', '.join(model.robot.joint_names)}; give the excitation that this robot followed"
+        )
     if isinstance(result, Diagnosis):
         content = Content(result.model, excitation, tuple(validations), result)
     else:

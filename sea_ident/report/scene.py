@@ -153,8 +153,8 @@ def _parts(robot: Robot) -> list[Part]:
         placed = vertices @ frame.placement.rotation.T + frame.placement.translation
         parts.append(Part(body, color or _PALETTE[(body + 1) % len(_PALETTE)], placed, faces))
     drawn = {part.body for part in parts}
-    parts.extend(_stick(robot, body) for body in range(len(robot.bodies)) if body not in drawn)
-    return parts
+    missing = [body for body in range(-1, len(robot.bodies)) if body not in drawn]
+    return [*parts, *(stick for body in missing for stick in _sticks(robot, body))]
 
 
 def _shapes(robot: Robot) -> list[tuple[str, tuple[int, int, int] | None, FloatArray, IntArray]]:
@@ -208,16 +208,35 @@ def _color(material: Any, known: dict[str, Any]) -> tuple[int, int, int] | None:
     return red, green, blue
 
 
-def _stick(robot: Robot, body: int) -> Part:
-    """A slender bar from the joint of a body to the next joint, or to its centre of mass."""
+def _sticks(robot: Robot, body: int) -> list[Part]:
+    """Slender bars from the joint of a body (-1: from the world) to the next joints, or to its centre of mass.
+
+    A slide gets a rail over its range too, or its child would hang in the air.
+    """
     model = robot.model
     children = [k for k in range(1, model.njoints) if model.parents[k] == body + 1]
-    end = model.jointPlacements[children[0]].translation if children else model.inertias[body + 1].lever
-    length = float(np.linalg.norm(end))
+    ends = [model.jointPlacements[k].translation for k in children]
+    if not ends and body >= 0:
+        ends = [model.inertias[body + 1].lever]
+    lines = [(np.zeros(3), end) for end in ends if body >= 0 or np.linalg.norm(end) > 1e-6]
+    for i, joint in enumerate(robot.joints):
+        k = model.getJointId(joint.name)
+        if joint.prismatic and k in children and np.isfinite(robot.limits.upper[i] - robot.limits.lower[i]):
+            place = model.jointPlacements[k]
+            slide = model.joints[k].createData()
+            model.joints[k].calc(slide, np.zeros(model.nq))
+            axis = place.rotation @ np.ravel(slide.S)[:3]
+            lines.append(tuple(place.translation + axis * at for at in (robot.limits.lower[i], robot.limits.upper[i])))
+    return [_bar(body, start, end) for start, end in lines]
+
+
+def _bar(body: int, start: FloatArray, end: FloatArray) -> Part:
+    length = float(np.linalg.norm(end - start))
     if length < 1e-6:
         mesh = trimesh.creation.icosphere(subdivisions=1, radius=0.02)
+        mesh.apply_translation(start)
     else:
-        mesh = trimesh.creation.cylinder(radius=0.06 * length + 0.004, segment=[np.zeros(3), end], sections=16)
+        mesh = trimesh.creation.cylinder(radius=0.06 * length + 0.004, segment=[start, end], sections=16)
     color = _PALETTE[(body + 1) % len(_PALETTE)]
     return Part(body, color, np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.intp))
 

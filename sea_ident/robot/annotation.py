@@ -71,7 +71,8 @@ def _text_number(parent: etree._Element, tag: str, where: str, *, positive: bool
     try:
         value = float(text)
     except ValueError:
-        raise RobotError(f"{where}: <{tag}> holds {text!r}, not a number") from None
+        hint = "; expand the file with xacro first" if "${" in text else ""
+        raise RobotError(f"{where}: <{tag}> holds {text!r}, not a number{hint}") from None
     if not abs(value) <= LARGEST_NUMBER or (positive and value < 0.0):
         raise RobotError(f"{where}: <{tag}> is {text}; it must be finite and not negative")
     return value

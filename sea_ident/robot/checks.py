@@ -10,6 +10,9 @@ from sea_ident.robot.annotation import Annotation
 from sea_ident.robot.model import Joint
 from sea_ident.robot.urdf import UrdfTree
 
+FEW_TURNS, MANY_TURNS = 4.0, 200.0
+"""Range of a revolute joint [turns] that looks like degrees; what is larger stands for no limit."""
+
 
 def check_bodies(tree: UrdfTree, model: pin.Model) -> list[str]:
     """Check mass and inertia of the bodies that move.
@@ -85,6 +88,14 @@ def check_annotation(tree: UrdfTree, annotation: Annotation, joints: Sequence[Jo
         notes.append(
             f"no range is stated for {', '.join(unlimited)} (no <limit>, or lower = upper = 0): taken as unlimited"
         )
+    for joint in joints:
+        stated = tree.joints[joint.name]
+        turns = (stated.upper - stated.lower) / (2.0 * np.pi)
+        if joint.type == "revolute" and FEW_TURNS < turns < MANY_TURNS:
+            notes.append(
+                f"the range of {joint.name!r} is {stated.lower:g} to {stated.upper:g} rad, {turns:.3g} turns: "
+                "URDF takes radians; if these are degrees, change them"
+            )
     if annotation.ignored:
         kinds = ", ".join(annotation.ignored)
         notes.append(f"transmissions of these types are not read, their joints count as rigid: {kinds}")

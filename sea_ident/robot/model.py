@@ -9,6 +9,7 @@ import pinocchio as pin
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import RobotError
 from sea_ident.robot.actuator import Actuator, SeriesElasticActuator
+from sea_ident.robot.describe import robot_summary
 from sea_ident.robot.limits import Limits
 
 INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -269,21 +270,8 @@ class Robot:
         return first, second
 
     def summary(self) -> str:
-        """A table of joints and actuators."""
-        lines = [f"{self.name}: {self.n} joints, {len(self.rotors)} motors, {sum(self.elastic)} springs"]
-        width = max((len(j.name) for j in self.joints), default=5)
-        for i, joint in enumerate(self.joints):
-            gear = "" if joint.actuator is None else f"  gear {joint.actuator.gear_ratio:g}"
-            kind = "elastic" if joint.elastic else "rigid"
-            lower, upper = self.limits.lower[i], self.limits.upper[i]
-            lines.append(
-                f"  {joint.name:<{width}}  {joint.type:<10} {kind:<7}  "
-                f"[{lower:.4g}, {upper:.4g}] {joint.position_unit}{gear}"
-            )
-        held = ", ".join(f"{name} at {value:.4g}" for name, value in self.locked.items())
-        lines.extend([f"  locked: {held}"] if held else [])
-        lines.extend(f"  warning: {text}" for text in self.warnings)
-        return "\n".join(lines)
+        """A table of joints, with limits, motors and springs as far as the description states them."""
+        return robot_summary(self)
 
 
 def rotor_body(inertia: float) -> pin.Inertia:

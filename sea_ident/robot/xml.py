@@ -73,12 +73,16 @@ def number(element: etree._Element, attribute: str, default: float | None, where
     try:
         value = float(text)
     except ValueError:
-        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not a number") from None
+        raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not a number{_hint(text)}") from None
     if isnan(value) or (finite and isinf(value)):
         raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is not finite")
     if finite and abs(value) > LARGEST_NUMBER:
         raise RobotError(f"{where}: {attribute}={text!r} of <{element.tag}> is larger than any robot; check its unit")
     return value
+
+
+def _hint(text: str) -> str:
+    return "; expand the file with xacro first" if "${" in text or "$(" in text else ""
 
 
 def vector(element: etree._Element | None, attribute: str, default: str, where: str) -> FloatArray:
@@ -91,7 +95,7 @@ def vector(element: etree._Element | None, attribute: str, default: str, where: 
     try:
         value = np.array([float(part) for part in text.split()])
     except ValueError:
-        raise RobotError(f"{where}: {attribute}={text!r} is not three numbers") from None
+        raise RobotError(f"{where}: {attribute}={text!r} is not three numbers{_hint(text)}") from None
     if value.shape != (3,) or not np.all(np.isfinite(value)):
         raise RobotError(f"{where}: {attribute}={text!r} is not three finite numbers")
     if np.any(np.abs(value) > LARGEST_NUMBER):

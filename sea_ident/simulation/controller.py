@@ -59,6 +59,10 @@ def reference_inertia(robot: Robot, q: FloatArray) -> FloatArray:
     return total / len(chosen)
 
 
+HIGHEST_GAIN = 100.0
+"""Largest factor by which friction may raise the gains of a controller; a joint at rest needs to overcome none."""
+
+
 @dataclass(frozen=True)
 class VelocityController(Controller):
     """Velocity loop with position correction and feed-forward, on the motor side (paper, section III.C).
@@ -70,23 +74,29 @@ class VelocityController(Controller):
         bandwidth: w_v of the velocity loop [rad/s].
         correction: w_p of the position correction [rad/s].
         feedforward: f, share of the torque of the robot's own URDF model (bodies, rotors, viscous friction) [-].
+        held_back: where the Coulomb friction of the description would hold back more than this share of the motion
+            (rms), as at small slides behind a large gear, the gains rise until it does not [-].
     """
 
     bandwidth: float = 60.0
     correction: float = 15.0
     feedforward: float = 1.0
+    held_back: float = 0.2
 
     def __post_init__(self) -> None:
-        if not (self.bandwidth > 0.0 and self.correction >= 0.0 and self.feedforward >= 0.0):
+        if not (self.bandwidth > 0.0 and self.correction >= 0.0 and self.feedforward >= 0.0 and self.held_back > 0.0):
             raise SimulationError(
-                f"velocity controller: bandwidth {self.bandwidth} must be positive, correction {self.correction} and "
-                f"feedforward {self.feedforward} not negative"
+                f"velocity controller: bandwidth {self.bandwidth} and held_back {self.held_back} must be positive, "
+                f"correction {self.correction} and feedforward {self.feedforward} not negative"
             )
 
     def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
         """The drive at the times (N,) [s]."""
         motion = reference.motion(time)
         velocity_gain = reference_inertia(robot, motion.q) * self.bandwidth
+        allowed = self.held_back * self.correction * motion.theta.std(axis=0)
+        overcoming = _known_coulomb_friction(robot) / np.maximum(allowed, 1e-12)
+        velocity_gain = np.clip(overcoming, velocity_gain, HIGHEST_GAIN * velocity_gain)
         torque = np.zeros_like(motion.q)
         if self.feedforward > 0.0:
             link, motor = inverse_dynamics(robot, motion)
@@ -97,6 +107,14 @@ class VelocityController(Controller):
 def _known_viscous_friction(robot: Robot) -> FloatArray:
     values = [
         (joint.damping or 0.0) + ((joint.actuator.viscous_friction or 0.0) if joint.actuator is not None else 0.0)
+        for joint in robot.joints
+    ]
+    return np.array(values)
+
+
+def _known_coulomb_friction(robot: Robot) -> FloatArray:
+    values = [
+        (joint.friction or 0.0) + ((joint.actuator.coulomb_friction or 0.0) if joint.actuator is not None else 0.0)
         for joint in robot.joints
     ]
     return np.array(values)

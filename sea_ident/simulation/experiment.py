@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect
 from sea_ident.exceptions import SimulationError
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.recordings import Recording
@@ -70,9 +71,9 @@ def simulate(
         periods: number of recorded periods of a Fourier series.
         seed: of noise and jitter; equal seeds give equal results.
         sensors: noise and resolution; `SensorNoise()` by default, `SensorNoise.none()` for exact signals.
-        jitter: friction that varies from pass to pass; `FrictionJitter()` by default.
+        jitter: friction that varies from pass to pass, at all joints alike; `FrictionJitter.usual(robot)` by default.
         controller: `VelocityController()` by default, which applies the reference to the motors.
-        friction: Coulomb friction around zero speed, one law or one per joint; `SmoothCoulomb()` by default.
+        friction: Coulomb friction around zero speed, one law or one per joint; `SmoothCoulomb.usual(robot)` by default.
         plant: the true numbers; those of the robot's description by default.
         effects: what else acts.
         warm_up: temperature of the motors; not simulated by default.
@@ -89,6 +90,9 @@ def simulate(
     Raises:
         SimulationError: a number is missing, the reference does not fit, or the motion diverges.
     """
+    expect(robot, "simulate: robot", Robot)
+    for each in effects:
+        expect(each, "simulate: each of effects", PlantedEffect)
     if periods < 1 or not rate > 0.0 or not step > 0.0:
         raise SimulationError(f"periods {periods}, rate {rate} Hz and step {step} s must all be positive")
     check_planted(robot, effects)
@@ -103,7 +107,7 @@ def simulate(
     streams = np.random.SeedSequence(seed).spawn(2)
 
     # -- the closed loop
-    laws = _per_joint(robot, friction or SmoothCoulomb())
+    laws = _per_joint(robot, friction or SmoothCoulomb.usual(robot))
     motors = [
         law.start(float(viscous), float(coulomb), float(theta))
         for law, viscous, coulomb, theta in zip(
@@ -138,9 +142,9 @@ def simulate(
                 f"after {settling_periods} settling periods the motion still changes by {settled:.2g} (rad or m) from "
                 "one period to the next"
             )
-    vary = jitter or FrictionJitter()
+    varied = FrictionJitter.usual(robot) if jitter is None else (jitter,) * robot.n
     seeds = streams[0].spawn(robot.n)
-    system.replace_motor_friction([vary.on(f, child) for f, child in zip(motors, seeds, strict=True)])
+    system.replace_motor_friction([v.on(f, child) for v, f, child in zip(varied, motors, seeds, strict=True)])
     count = periods if follow.period is not None else 1
     tell = progress or (lambda done: None)
     tell(0)

@@ -11,6 +11,10 @@ from typing import Protocol
 import numpy as np
 
 from sea_ident.exceptions import SimulationError
+from sea_ident.robot import Robot
+
+SLIDE = 0.1
+"""Speeds [m/s] of a slide per speeds [rad/s] of a turning joint, where nothing else is known."""
 
 
 class JointFriction(Protocol):
@@ -49,6 +53,14 @@ class SmoothCoulomb(FrictionLaw):
     """
 
     smoothing: float = 0.008
+
+    @staticmethod
+    def usual(robot: Robot) -> tuple["SmoothCoulomb", ...]:
+        """(n,) one per joint; slides, which move at tenths of a metre per second, turn over at a tenth of the speed."""
+        return tuple(
+            SmoothCoulomb(SLIDE * SmoothCoulomb.smoothing if j.prismatic else SmoothCoulomb.smoothing)
+            for j in robot.joints
+        )
 
     def __post_init__(self) -> None:
         if not self.smoothing > 0.0:
@@ -140,6 +152,14 @@ class FrictionJitter:
             raise SimulationError(
                 f"friction jitter: spread {self.spread} must not be negative, speed {self.speed} must be positive"
             )
+
+    @staticmethod
+    def usual(robot: Robot) -> tuple["FrictionJitter", ...]:
+        """(n,) one per joint; that of slides ends at a tenth of the speed."""
+        return tuple(
+            FrictionJitter(speed=SLIDE * FrictionJitter.speed if j.prismatic else FrictionJitter.speed)
+            for j in robot.joints
+        )
 
     @staticmethod
     def none() -> "FrictionJitter":

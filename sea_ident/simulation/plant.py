@@ -139,20 +139,31 @@ class Plant:
         return "\n".join(lines)
 
 
+_ABSENT = {
+    "viscousFriction": "no viscous friction of the motor",
+    "coulombFriction": "no Coulomb friction of the motor",
+    "rotorInertia": "a motor without inertia",
+    "damping": "a spring without damping",
+    "cubicStiffness": "a linear spring",
+    "efficiency": "a transmission without losses",
+}
+"""What a simulation takes a number for that the annotation leaves out."""
+
+
 def plant_from_robot(robot: Robot) -> Plant:
     """The plant that the URDF and the annotation describe.
 
-    What a motor or spring needs and the annotation leaves out is an error. A spring without `cubicStiffness` is
-    linear, a transmission without `efficiency` loses nothing, a joint without `<dynamics>` has no link friction (the
-    URDF's own default), and a joint without motor has no friction of a motor.
+    What no motion is possible without is an error where the annotation leaves it out: the stiffness of a spring and the
+    rotor inertia before it. All else is absent where it is not stated, and the notes say so: friction, the damping of a
+    spring, its cubic stiffness, losses of a transmission, the rotor of a rigid joint. A joint without `<dynamics>` has
+    no link friction (the URDF's own default), and a joint without motor has no friction of a motor.
 
     Raises:
         SimulationError: a number is missing; the message names the joint and the element.
     """
     n = robot.n
     missing: list[str] = []
-    linear: list[str] = []
-    lossless: list[str] = []
+    absent: dict[str, list[str]] = {}
     numbers = {name: np.zeros(n) for name in Plant.numbers()}
     numbers["efficiency"][:] = 1.0
     numbers["torque_constant"][:] = np.nan
@@ -163,36 +174,40 @@ def plant_from_robot(robot: Robot) -> Plant:
         numbers[f"{on_link}coulomb_friction"][i] += joint.friction or 0.0
         if actuator is None:
             continue
-        wanted = {
-            "rotorInertia": actuator.rotor_inertia,
+        known: dict[str, float | None] = {
             "viscousFriction": actuator.viscous_friction,
             "coulombFriction": actuator.coulomb_friction,
+            "efficiency": actuator.efficiency,
         }
+        needed = {}
         if joint.elastic:
             spring = robot.spring(joint.name)
-            wanted |= {"stiffness": spring.stiffness, "damping": spring.damping}
+            known |= {"damping": spring.damping, "cubicStiffness": spring.cubic_stiffness}
+            needed = {
+                "<rotorInertia> in <actuator>": actuator.rotor_inertia or None,
+                'stiffness="..." in <seriesElastic>': spring.stiffness,
+            }
             numbers["stiffness"][i] = spring.stiffness or 0.0
             numbers["spring_damping"][i] = spring.damping or 0.0
             numbers["cubic_stiffness"][i] = spring.cubic_stiffness or 0.0
-            if spring.cubic_stiffness is None:
-                linear.append(joint.name)
-        missing += [f"{joint.name}: {tag}" for tag, value in wanted.items() if value is None]
+        else:
+            known["rotorInertia"] = actuator.rotor_inertia
+        missing += [f"{joint.name}: {tag}" for tag, value in needed.items() if value is None]
+        for tag, value in known.items():
+            if value is None:
+                absent.setdefault(tag, []).append(joint.name)
         numbers["viscous_friction"][i] += actuator.viscous_friction or 0.0
         numbers["coulomb_friction"][i] += actuator.coulomb_friction or 0.0
-        if actuator.efficiency is None:
-            lossless.append(joint.name)
-        else:
+        if actuator.efficiency is not None:
             numbers["efficiency"][i] = actuator.efficiency
         if actuator.torque_constant is not None:
             numbers["torque_constant"][i] = actuator.torque_constant
     if missing:
         raise SimulationError(
-            f"{robot.source}: a simulation needs numbers that the annotation leaves out: {'; '.join(missing)}. "
-            "Add them to the <transmission>, or give simulate(plant=...)"
+            f"{robot.source}: an elastic joint cannot be simulated without its spring and the inertia of its rotor, "
+            f"and the <transmission> leaves out {'; '.join(missing)}. Add them, or in Python give simulate(plant=...)"
         )
-    notes = []
-    if linear:
-        notes.append(f"no cubicStiffness, so a linear spring: {', '.join(linear)}")
-    if lossless:
-        notes.append(f"no efficiency, so a transmission without losses: {', '.join(lossless)}")
-    return Plant(robot, notes=tuple(notes), **numbers)
+    notes = tuple(
+        f"no {tag}, so {meaning}: {', '.join(absent[tag])}" for tag, meaning in _ABSENT.items() if tag in absent
+    )
+    return Plant(robot, notes=notes, **numbers)

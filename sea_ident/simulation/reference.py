@@ -108,11 +108,19 @@ def as_reference(robot: Robot, reference: FourierSeries | HasSeries | Motion) ->
         SimulationError: if it does not fit the robot.
     """
     if isinstance(reference, HasSeries):
+        names = tuple(getattr(reference, "joint_names", robot.joint_names))
+        if names != robot.joint_names:
+            raise SimulationError(
+                f"the reference was designed for the joints {', '.join(names)}; {robot.name} has "
+                f"{', '.join(robot.joint_names)}, and its limits are others: design one for it (excite)"
+            )
         reference = reference.series
     if not isinstance(reference, FourierSeries | Motion):
         raise SimulationError(
             f"the reference is a {type(reference).__name__}; give a FourierSeries, an Excitation or a Motion"
         )
     if reference.n != robot.n:
-        raise SimulationError(f"the reference has {reference.n} joints, {robot.name} has {robot.n}")
+        raise SimulationError(
+            f"the reference has {reference.n} joints; {robot.name} has {robot.n}: {', '.join(robot.joint_names)}"
+        )
     return PeriodicReference(reference) if isinstance(reference, FourierSeries) else SampledReference(reference)

@@ -123,3 +123,19 @@ def test_seven_joints_predict_another_motion_no_worse_than_the_free_fit():
     exact = build_total(arm, effects, other) @ parameters
     free, possible = (np.sqrt(np.mean((m.predict(other) - exact) ** 2)) for m in (model, found.model))
     assert possible < 1.02 * free
+
+
+def test_a_move_within_the_uncertainty_is_no_alarm(model):
+    row = model.names.index("foot.Iyy")
+    values = model.values.copy()
+    values[row] = -1e-5
+    loose = replace(model, values=values, uncertainty=replace(model.uncertainty, covariance=4e4 * model.covariance))
+    near = physical_parameters(loose)
+    assert not near.consistent
+    assert near.within_uncertainty
+    assert "within their uncertainty" in near.verdict()
+    values[row] = -0.02
+    far = physical_parameters(replace(model, values=values))
+    assert not far.within_uncertainty
+    assert far.verdict().startswith("no real bodies")
+    assert "standard deviations" in far.verdict()

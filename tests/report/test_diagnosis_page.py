@@ -169,3 +169,14 @@ def test_bars_are_as_high_as_their_values():
     assert heights[1] == pytest.approx(heights[0] / 4, abs=0.1)
     assert heights[2] == pytest.approx(heights[0] / 2, abs=0.1)
     assert json.dumps([e.find("title").text for e in rectangles]).count("N m") == 4
+
+
+def test_where_nothing_is_missing_no_share_of_a_gap_is_told(diagnosis, tmp_path):
+    """0 % closed would read as a failure where there was nothing to add."""
+    nothing = replace(diagnosis, verdict=Verdict.NONE, missing=(), text="Nothing is missing.", simulation_gap={})
+    path = tmp_path / "r.html"
+    write_report(nothing, path)
+    text = path.read_text(encoding="utf-8")
+    assert "of the gap closed" not in text
+    assert "% of the gap is closed" not in text
+    assert "nothing was added" in text

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sea_ident.estimation import Agreement
-from sea_ident.exceptions import OutputError, SeaIdentWarning
+from sea_ident.exceptions import OutputError, SeaIdentError, SeaIdentWarning
+from sea_ident.excitation import design_excitation
 from sea_ident.report import write_report
 from sea_ident.report.content import Content
 from sea_ident.report.page import number, unit
@@ -68,6 +69,14 @@ def page_text(leg_model, validation, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
     write_report(leg_model, path, validations=[validation])
     return path.read_text(encoding="utf-8")
+
+
+def test_an_excitation_of_other_joints_is_refused(leg_model, tmp_path):
+    excitation = design_excitation(leg_model.robot, starts=1, harmonics=2)
+    other = replace(excitation, joint_names=("a", "b", "c"))
+    with pytest.raises(SeaIdentError, match="is one of a, b, c, the model one of hip, knee, ankle"):
+        write_report(leg_model, tmp_path / "r.html", excitation=other)
+    assert not (tmp_path / "r.html").exists()
 
 
 def test_the_page_is_well_formed_small_and_refers_to_nothing_outside(page_text):

@@ -6,9 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
+from scipy.spatial import Delaunay
 
 from sea_ident import load_robot
-from sea_ident.exceptions import RobotError
+from sea_ident.exceptions import RobotError, SeaIdentWarning
 from sea_ident.report.scene import MOST_FACES, MOST_FRAMES, build_scene, simplify
 from sea_ident.robot import robot_from_text
 from sea_ident.robot.geometry import read_geometry
@@ -76,7 +77,7 @@ def test_meshes_out_of_reach_become_sticks_to_the_next_joint():
     text = load_robot("example:ur_description/urdf/ur5_robot.urdf").urdf
     robot = robot_from_text(text, "a model file")
     scene = build_scene(robot, np.array([0.0, 1.0]), np.zeros((2, robot.n)), periodic=False)
-    assert {part.body for part in scene.parts} == set(range(robot.n))
+    assert {part.body for part in scene.parts} == set(range(-1, robot.n))
     model = robot.model
     upper_arm = next(part for part in scene.parts if part.body == 1)
     length = np.linalg.norm(model.jointPlacements[model.getJointId("elbow_joint")].translation)
@@ -111,3 +112,32 @@ def test_shapes_that_cannot_be_read_are_sticks(leg_model):
         read_geometry(damaged.urdf, damaged.source)
     scene = build_scene(damaged, np.array([0.0, 1.0]), np.zeros((2, 3)), periodic=False)
     assert [part.body for part in scene.parts] == [0, 1, 2]
+
+
+def test_sticks_hang_together_at_branches_and_slides():
+    """Without any visual, every joint begins inside a stick of the body that carries it, in every pose."""
+    box = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    limit = '<limit lower="-0.2" upper="0.3" velocity="1" effort="1"/>'
+
+    def joint(name, kind, parent, child, xyz):
+        return (
+            f'<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="0.3 -0.2 0.5"/><parent link="{parent}"/>'
+            f'<child link="{child}"/><axis xyz="0 0.6 0.8"/>{limit}</joint>'
+        )
+
+    text = '<robot name="r">' + "".join(f'<link name="{n}">{box}</link>' for n in "abcde")
+    text += joint("one", "revolute", "a", "b", "0.1 0.2 0.3") + joint("two", "prismatic", "b", "c", "0.4 0 0.1")
+    text += (
+        joint("three", "revolute", "b", "d", "0 -0.3 0.2") + joint("four", "revolute", "c", "e", "0 0 0.3") + "</robot>"
+    )
+    with pytest.warns(SeaIdentWarning, match="no transmission"):
+        robot = robot_from_text(text, "r.urdf")
+    q = np.random.default_rng(1).uniform(-0.19, 0.29, (5, 4))
+    scene = build_scene(robot, np.arange(5.0), q, periodic=False)
+    for k in range(5):
+        for body in range(4):
+            parent = robot.model.parents[body + 1] - 1
+            place = np.eye(3, 4) if parent < 0 else scene.poses[k, parent]
+            inside = place[:, :3].T @ (scene.poses[k, body, :, 3] - place[:, 3])
+            hulls = [Delaunay(part.vertices) for part in scene.parts if part.body == parent]
+            assert any(hull.find_simplex(inside, tol=1e-6) >= 0 for hull in hulls), (k, body)

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
-from plants import Wave, from_parts, joint, link, modest_series, motor, ur10
+from plants import Wave, from_parts, joint, link, modest_series, motor, quietly, ur10
 
-from sea_ident import FourierSeries, Motion, SeaIdentError, load_robot
+from sea_ident import FourierSeries, Motion, SeaIdentError, design_excitation, load_robot
+from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.regressor import inverse_dynamics
 from sea_ident.simulation import (
     ComputedTorque,
     FrictionJitter,
@@ -126,26 +128,58 @@ def test_diverging_motion_names_joint_and_time():
         simulate(robot, modest_series(robot), controller=pushing)
 
 
-@pytest.mark.parametrize(
-    ("numbers", "spring", "missing"),
-    [
-        ("<coulombFriction>1</coulombFriction>", 'stiffness="100" damping="1"', "swing: viscousFriction"),
-        ("<viscousFriction>1</viscousFriction>", 'stiffness="100" damping="1"', "swing: coulombFriction"),
-        ("", 'damping="1"', "swing: stiffness"),
-        ("", 'stiffness="100"', "swing: damping"),
-    ],
-)
-def test_missing_numbers_are_named(numbers, spring, missing):
+def test_missing_stiffness_is_named():
     robot = from_parts(
-        '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"), motor("swing", spring, numbers)
+        '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"), motor("swing", 'damping="1"')
     )
-    with pytest.raises(SeaIdentError, match=missing):
+    with pytest.raises(SeaIdentError, match="swing: stiffness"):
         simulate(robot, modest_series(robot), periods=1)
 
 
 def test_missing_rotor_inertia_is_named():
-    with pytest.raises(SeaIdentError, match="output: rotorInertia"):
+    with pytest.raises(SeaIdentError, match="output: <rotorInertia>"):
         plant_from_robot(load_robot("hebi_x5"))
+
+
+def test_what_is_not_stated_is_absent_and_said():
+    """Only gear, rotor and stiffness: no motor of an annotated robot needs more to be simulated than a bare one."""
+    robot = from_parts(
+        '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"),
+        motor("swing", 'stiffness="100"', "<!-- nothing -->"),
+    )  # fmt: skip
+    run = simulate(robot, modest_series(robot), periods=1, sensors=SensorNoise.none(), jitter=FrictionJitter.none())
+    for tag in ("viscousFriction", "coulombFriction", "damping", "cubicStiffness", "efficiency"):
+        assert f"no {tag}," in run.summary()
+    # the spring alone carries the link, and the motor torque is that of bodies and rotor
+    link_torque, motor_torque = inverse_dynamics(robot, run.motion)
+    assert run.tau_motor == pytest.approx(link_torque + motor_torque, abs=1e-3)
+    assert run.tau_spring == pytest.approx(100.0 * run.motion.deflection, abs=1e-9)
+
+
+def test_friction_does_not_hold_a_small_slide_back():
+    """A gripper: centimetres of motion, little inertia, and friction that outweighs what the usual gains give."""
+    robot = from_parts(
+        '<link name="base"/>', link("finger", mass=0.2),
+        '<joint name="grip" type="prismatic"><parent link="base"/><child link="finger"/><axis xyz="1 0 0"/>'
+        '<limit lower="0" upper="0.04" velocity="0.2" effort="50"/></joint>',
+        motor("grip", None, "<coulombFriction>5</coulombFriction>").replace("3e-5", "1e-5"),
+    )  # fmt: skip
+    series = FourierSeries(0.1, np.array([0.02]), np.array([[0.003, 0.002]]), np.array([[0.0, 0.005]]))
+    run = simulate(robot, series, periods=1, sensors=SensorNoise.none(), jitter=FrictionJitter.none())
+    error = run.motion.theta - run.reference.theta
+    assert np.sqrt(np.mean(error**2)) < 0.25 * run.reference.theta.std()
+
+
+def test_friction_of_a_slide_turns_over_at_slide_speeds():
+    """By default the model of a slide smooths at 1 mm/s; a simulation that smoothed as at a hinge would differ."""
+    robot = quietly(load_robot, "emps")
+    (model,) = CoulombFriction.instances(robot)
+    (law,) = SmoothCoulomb.usual(robot)
+    assert law.smoothing == pytest.approx(model.smoothing, rel=0.3)
+    (hinge, *_) = SmoothCoulomb.usual(load_robot("exo_leg"))
+    assert hinge == SmoothCoulomb()
+    (jitter,) = FrictionJitter.usual(robot)
+    assert jitter.speed == pytest.approx(0.1 * FrictionJitter().speed)
 
 
 @pytest.mark.parametrize(
@@ -180,3 +214,15 @@ def test_friction_jitters_by_default(leg, leg_series, exact):
     varied = simulate(leg, leg_series, **options)
     alike = simulate(leg, leg_series, jitter=FrictionJitter.none(), **options)
     assert np.abs(varied.motion.theta - alike.motion.theta).max() > 1e-5
+
+
+def test_an_excitation_of_another_robot_is_refused(leg):
+    """As many joints, other names: its limits and its meaning are those of the other robot."""
+    other = from_parts(
+        '<link name="base"/>', link("one"), link("two"), link("three"),
+        joint("a", "base", "one", "0 1 0"), joint("b", "one", "two", "0 1 0"), joint("c", "two", "three", "0 1 0"),
+    )  # fmt: skip
+    excitation = design_excitation(leg, starts=1, harmonics=2)
+    with pytest.raises(SeaIdentError, match=r"designed for the joints hip, knee, ankle; test has a, b, c"):
+        simulate(other, excitation, periods=1)
+    assert simulate(leg, excitation, periods=1).periods == 1

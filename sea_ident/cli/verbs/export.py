@@ -1,13 +1,16 @@
 """`sea-ident export`: an identified model for other tools."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sea_ident.cli.options import AsJson, ModelFile
 from sea_ident.cli.output import check_targets, emit, progress
 from sea_ident.exceptions import SeaIdentError
+
+if TYPE_CHECKING:
+    from sea_ident.export import Export
 
 
 def export(
@@ -31,6 +34,15 @@ def export(
         if mjcf is not None:
             done.append(export_mjcf(loaded, mjcf))
     files = [str(path) for path in (urdf, mjcf) if path is not None]
-    text = "\n".join([*(result.summary() for result in done), f"written: {', '.join(files)}"])
+    text = "\n".join([*_remarks(done), f"written: {', '.join(files)}"])
     warnings = list(dict.fromkeys(text for result in done for text in result.warnings))
     emit({"files": files, "warnings": warnings}, text, as_json=as_json)
+
+
+def _remarks(done: "list[Export]") -> list[str]:
+    """Notes and warnings, each once; what holds for one format only says for which."""
+    places: dict[str, list[str]] = {}
+    for result in done:
+        for text in (*result.notes, *(f"warning: {text}" for text in result.warnings)):
+            places.setdefault(text, []).append(result.format)
+    return [text if len(found) == len(done) else f"{found[0]}: {text}" for text, found in places.items()]

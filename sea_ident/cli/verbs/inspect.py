@@ -8,7 +8,7 @@ from sea_ident.cli.output import emit, progress
 
 if TYPE_CHECKING:
     from sea_ident.base_parameters import BaseParameters
-    from sea_ident.robot import Robot
+    from sea_ident.robot import Joint, Robot
 
 
 def inspect(
@@ -27,6 +27,15 @@ def inspect(
     emit(_record(loaded, base), f"{loaded.summary()}\n{base.summary()}", as_json=as_json)
 
 
+def _spring(joint: "Joint") -> dict[str, float | None] | None:
+    """What the annotation states of the spring of a joint; None at a rigid joint."""
+    from sea_ident.robot import SeriesElasticActuator
+
+    if not isinstance(joint.actuator, SeriesElasticActuator):
+        return None
+    return {kind: getattr(joint.actuator, kind) for kind in ("stiffness", "cubic_stiffness", "damping")}
+
+
 def _record(robot: "Robot", base: "BaseParameters") -> dict[str, Any]:
     limits = robot.limits
     kinds = ("lower", "upper", "velocity", "acceleration", "jerk", "torque", "deflection")
@@ -39,6 +48,10 @@ def _record(robot: "Robot", base: "BaseParameters") -> dict[str, Any]:
                 "type": joint.type,
                 "elastic": joint.elastic,
                 "gear_ratio": None if actuator is None else actuator.gear_ratio,
+                "followers": joint.followers,
+                "damping": joint.damping,
+                "friction": joint.friction,
+                "spring": _spring(joint),
                 "limits": {kind: float(getattr(limits, kind)[i]) for kind in kinds},
                 "actuator": None
                 if actuator is None
@@ -47,6 +60,9 @@ def _record(robot: "Robot", base: "BaseParameters") -> dict[str, Any]:
                     "torque_constant": actuator.torque_constant,
                     "rotor_inertia": actuator.rotor_inertia,
                     "efficiency": actuator.efficiency,
+                    "viscous_friction": actuator.viscous_friction,
+                    "coulomb_friction": actuator.coulomb_friction,
+                    "rotor_group": actuator.rotor_group,
                     "carrier": actuator.carrier,
                     "rotor_axis": actuator.rotor_axis,
                 },

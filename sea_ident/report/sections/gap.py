@@ -28,10 +28,12 @@ class GapSection(DiagnosisSection):
             ("data that were held out", diagnosis.holdout),
         ):
             if gap is not None:
-                groups.append((_bars(gap, f"On {label}", "N m or N"), _closed(gap)))
+                groups.append((_bars(gap, f"On {label}", "N m or N"), _closed(gap, bool(diagnosis.missing))))
         for signal, gap in diagnosis.simulation_gap.items():
             unit, scale = UNITS.get(signal, ("", 1.0))
-            groups.append((_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap)))
+            groups.append(
+                (_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap, bool(diagnosis.missing)))
+            )
         if not groups:
             return None
         return {
@@ -41,10 +43,12 @@ class GapSection(DiagnosisSection):
         }
 
 
-def _closed(gap: Gap) -> str:
+def _closed(gap: Gap, added: bool) -> str:
     """How much of a gap is closed, in words."""
     if not any(value > 0.0 for value in gap.before.values()):
         return "The model was within the noise before already."
+    if not added:
+        return "No effect is named, so nothing was added."
     if gap.shrink < 0.0:
         return f"The gap is {-100.0 * gap.shrink:.0f} % larger."
     return f"{100.0 * gap.shrink:.0f} % of the gap is closed."

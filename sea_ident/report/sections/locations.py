@@ -33,7 +33,7 @@ class Locations(DiagnosisSection):
             # a logarithm, so that the weaker ones do not vanish beside the strongest
             values[i, j] = -np.log1p(x.z) / np.log1p(max(SATURATED, found[0].z))
             tips[i][j] = (
-                f"{x.joint}, {x.equation} equation\n{x.regime}\n{x.excess_rms:.3g} N m beyond noise, z = {x.z:.3g}"
+                f"{x.joint}, {x.equation} equation\n{x.regime}\n{x.excess_rms:.3g} N m or N beyond noise, z = {x.z:.3g}"
             )
         names = [f"{joint}, {equation}" for joint, equation in rows]
         return {

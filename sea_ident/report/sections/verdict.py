@@ -32,9 +32,9 @@ class VerdictSection(DiagnosisSection):
         lack = diagnosis.lack_of_fit
         tiles = [(str(len(diagnosis.missing)), "effect missing" if len(diagnosis.missing) == 1 else "effects missing")]
         for label, gap in (("the recording", diagnosis.training), ("held-out data", diagnosis.holdout)):
-            if gap is not None and any(value > 0.0 for value in gap.before.values()):
+            if diagnosis.missing and gap is not None and any(value > 0.0 for value in gap.before.values()):
                 tiles.append((f"{100 * gap.shrink:.0f} %", f"of the gap closed on {label}"))
-        if "q" in diagnosis.simulation_gap:
+        if diagnosis.missing and "q" in diagnosis.simulation_gap:
             shrink = diagnosis.simulation_gap["q"].shrink
             tiles.append((f"{100 * shrink:.0f} %", "of the gap closed in forward simulation of q"))
         equations = list(dict.fromkeys(name for parts in lack.per_joint.values() for name in parts))

@@ -1,0 +1,211 @@
+"""What no robot does, but a wrong unit, a wrong column or a broken encoder: said before anything is identified."""
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.recordings import Recording
+from sea_ident.robot import Joint, Robot
+
+BEYOND = 0.2
+"""Share of the width of the position limits by which a motion may leave them without a word."""
+
+WIDER = 5.0
+"""Excess over the position limits, in widths of theirs, from which on the unit is doubted; limits may be wrong too."""
+
+STRONGER = 3.0
+"""Torque over its limit from which on its unit is doubted."""
+
+ALIKE = 0.3
+"""Largest deviation of the slope of theta over q from 1 without a word; a soft spring gives a tenth."""
+
+RECOGNISED = 0.15
+"""Deviation from a factor up to which it is recognised."""
+
+STILL = 20
+"""Equal samples in a row from which on an encoder stands still."""
+
+MOVED = 0.1
+"""Share of the range of a position by which it does not move unseen, or within a sample."""
+
+FASTER = 6.0
+"""Speed over that of the faster tenth of the samples from which on a step is a jump."""
+
+
+def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray, torque: FloatArray) -> list[str]:
+    """Sentences about columns that cannot be what their names say.
+
+    Args:
+        recording: where they come from.
+        robot: the robot, with its limits.
+        q: (M, n) link positions [rad] or [m].
+        theta: (M, n) motor positions after the gear, those of the links at rigid joints [rad] or [m].
+        torque: (M, n) motor torque at the joint side [N m] or [N].
+
+    Returns:
+        What is wrong, where, and what to do; empty where all may be as it says.
+    """
+    found = []
+    for i, joint in enumerate(robot.joints):
+        found += _position(joint, robot.limits.lower[i], robot.limits.upper[i], q[:, i])
+        found += _torque(recording, joint, robot.limits.torque[i], torque[:, i])
+        sensors = [(f"q_{joint.name}", q[:, i])]
+        if joint.elastic:
+            found += _slope(joint, q[:, i], theta[:, i])
+            if recording.has("tau_spring", joint.name):
+                found += _sensor(joint, recording.channel("tau_spring", [joint.name])[:, 0], theta[:, i] - q[:, i])
+            sensors.append((f"theta_{joint.name}", theta[:, i]))
+        for k, (name, values) in enumerate(sensors):
+            partner = sensors[1 - k] if joint.elastic else None
+            found += _still(recording.time, name, values, joint, partner)
+            found += _jump(recording.time, name, values, joint)
+    return [f"{recording.source}: {text}" for text in found]
+
+
+def _say(column: str, setting: str) -> str:
+    key, _, value = setting.partition("=")
+    quoted = repr(value) if key == "unit" else value
+    return f"say ColumnSource({column!r}, {key}={quoted}), on the command line --column '{column}={column},{setting}'"
+
+
+def beyond_limits(recording: Recording, robot: Robot, q: FloatArray) -> list[str]:
+    """Sentences about motions (M, n) [rad] or [m] somewhat outside the limits of their joints."""
+    found = []
+    for i, joint in enumerate(robot.joints):
+        lower, upper = robot.limits.lower[i], robot.limits.upper[i]
+        if BEYOND * (upper - lower) < _excess(lower, upper, q[:, i]) <= WIDER * (upper - lower):
+            found.append(
+                f"{recording.source}: {_extent(joint, lower, upper, q[:, i])}: if they are right, is it the column of "
+                "another joint, or is its zero another one?"
+            )
+    return found
+
+
+def _excess(lower: float, upper: float, q: FloatArray) -> float:
+    """How far a position leaves its limits [rad] or [m]."""
+    return float(max(lower - q.min(), q.max() - upper)) if np.isfinite(upper - lower) else 0.0
+
+
+def _extent(joint: Joint, lower: float, upper: float, q: FloatArray) -> str:
+    unit = joint.position_unit
+    return (
+        f"q_{joint.name} goes from {q.min():.4g} to {q.max():.4g} {unit}, its limits are {lower:.4g} and {upper:.4g} "
+        f"{unit}"
+    )
+
+
+def _position(joint: Joint, lower: float, upper: float, q: FloatArray) -> list[str]:
+    """Whether a motion is so far outside the limits of its joint that its unit must be another."""
+    column, width, low, high = f"q_{joint.name}", upper - lower, float(q.min()), float(q.max())
+    if _excess(lower, upper, q) <= WIDER * width:
+        return []
+    where = _extent(joint, lower, upper, q)
+    factor, other = (0.001, "mm") if joint.prismatic else (np.pi / 180.0, "deg")
+    spare = 2.0 * width
+    if low * factor >= lower - spare and high * factor <= upper + spare:
+        long = "millimetres" if joint.prismatic else "degrees"
+        return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}, and the same for theta_{joint.name}"]
+    return [f"{where}: is it in another unit, such as counts of the encoder (unit=counts,counts_per_rev=...)?"]
+
+
+def _torque(recording: Recording, joint: Joint, limit: float, torque: FloatArray) -> list[str]:
+    """Whether the usual torque is far beyond what the joint can bear."""
+    usual = float(np.percentile(np.abs(torque), 90.0))
+    if not usual > STRONGER * limit:
+        return []
+    where = f"reaches {usual:.4g} {joint.torque_unit} at the joint {joint.name!r}, whose limit is {limit:.4g}"
+    if recording.has("tau_motor", joint.name):
+        return [f"tau_motor_{joint.name} {where}: is it in another unit, or at another side of the gear?"]
+    column = f"current_{joint.name}"
+    return [
+        f"{column} times torque constant and gear ratio {where}: is the current in milliamperes? Then "
+        f"{_say(column, 'unit=mA')}; else look at <torqueConstant> and <mechanicalReduction>"
+    ]
+
+
+def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> list[str]:
+    """Whether motor and link move as far: theta is meant after the gear, in the unit and sense of q."""
+    power, other = float(np.var(q)), float(np.var(theta))
+    if np.ptp(q) == 0.0 or np.ptp(theta) == 0.0 or joint.actuator is None:
+        return []  # said elsewhere
+    covariance = float(np.mean((q - q.mean()) * (theta - theta.mean())))
+    slope, correlation = covariance / power, covariance / np.sqrt(power * other)
+    if abs(slope - 1.0) <= ALIKE:
+        return []
+    column, ratio, turn = f"theta_{joint.name}", joint.actuator.gear_ratio, 180.0 / np.pi
+    where = f"{column} moves {slope:.4g} times as far as q_{joint.name}"
+    causes = {
+        -1.0: ("has one of the two the wrong sign?", column, "sign=-1"),
+        ratio: ("is it the angle before the gear?", column, f"gear_ratio={ratio:g}"),
+        -ratio: ("is it the angle before the gear, with the other sign?", column, f"gear_ratio={-ratio:g}"),
+        turn: ("is it in degrees?", column, "unit=deg"),
+        1.0 / turn: (f"is q_{joint.name} in degrees?", f"q_{joint.name}", "unit=deg"),
+    }
+    for factor, (question, name, setting) in causes.items():
+        if abs(slope / factor - 1.0) <= RECOGNISED and abs(correlation) > 0.7:
+            return [f"{where}: {question} Then {_say(name, setting)}"]
+    return [
+        f"{where}, correlation {correlation:.2f}: are both of this joint, in one unit, and theta after the gear? The "
+        "spring is between them, and all that is identified rests on it"
+    ]
+
+
+def _sensor(joint: Joint, torque: FloatArray, deflection: FloatArray) -> list[str]:
+    """Whether a measured spring torque follows the deflection."""
+    column = f"tau_spring_{joint.name}"
+    if np.ptp(torque) == 0.0:
+        return [f"{column} is constant, {torque[0]:g} {joint.torque_unit}: is the sensor dead? Leave it out"]
+    if np.ptp(deflection) > 0.0 and np.corrcoef(torque, deflection)[0, 1] < -0.5:
+        return [f"{column} falls where the deflection rises: has it the wrong sign? Then {_say(column, 'sign=-1')}"]
+    return []
+
+
+def unused(recording: Recording, robot: Robot) -> list[str]:
+    """Sentences about measured signals that the identification does not look at."""
+    measured = [f"tau_spring_{j.name}" for j in robot.joints if j.elastic and recording.has("tau_spring", j.name)]
+    if not measured:
+        return []
+    return [
+        f"{', '.join(measured)}: not used here, where springs follow from the motor torque; "
+        "identify_measured_springs fits them to the measured torque"
+    ]
+
+
+def _still(
+    time: FloatArray, name: str, values: FloatArray, joint: Joint, partner: tuple[str, FloatArray] | None
+) -> list[str]:
+    """Whether an encoder stands still while the other one of its joint moves, or jumps when it comes back."""
+    if np.ptp(values) == 0.0:
+        return []  # said elsewhere
+    ends = np.flatnonzero(np.concatenate([np.diff(values) != 0.0, [True]]))
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    for k in np.argsort(starts - ends, kind="stable")[:5]:
+        first, last = int(starts[k]), int(ends[k])
+        if last - first + 1 < STILL:
+            break
+        moves = None
+        if partner is not None and np.ptp(partner[1][first : last + 1]) > MOVED * np.ptp(partner[1]):
+            moves = f"while {partner[0]} moves by {np.ptp(partner[1][first : last + 1]):.3g} {joint.position_unit}"
+        elif last + 1 < len(values) and abs(values[last + 1] - values[last]) > MOVED * np.ptp(values):
+            moves = f"and then jumps by {values[last + 1] - values[last]:.3g} {joint.position_unit}"
+        if moves is not None:
+            return [
+                f"{name} stands still at {values[first]:.6g} {joint.position_unit} for {last - first + 1} samples from "
+                f"sample {first} (time {time[first]:g} s) {moves}: was the encoder dead? Leave out that part"
+            ]
+    return []
+
+
+def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
+    """Whether a position makes steps that no motion makes."""
+    steps = np.diff(values)
+    speed = np.abs(steps) / np.diff(time)
+    usual = float(np.percentile(speed, 90.0))
+    jumps = np.flatnonzero((speed > FASTER * usual) & (np.abs(steps) > MOVED * np.ptp(values)))
+    if not jumps.size or usual == 0.0:
+        return []
+    k = int(jumps[0])
+    more = "" if jumps.size == 1 else f", and {jumps.size} times in all"
+    return [
+        f"{name} jumps by {steps[k]:.4g} {joint.position_unit} after sample {k} (time {time[k]:g} s){more}: no motion "
+        "does that. Lost counts or a spike: leave out that part; a sensor that wraps around: say wraps_at=..."
+    ]

@@ -1,0 +1,126 @@
+"""Wrong units, wrong columns and broken encoders are said before they spoil a model."""
+
+import numpy as np
+import pytest
+from estimation.synthetic import leg_series, record, truth_of
+
+from sea_ident.exceptions import RecordingError, SeaIdentWarning
+from sea_ident.processing import process
+from sea_ident.processing.plausible import beyond_limits, doubts
+from sea_ident.recordings import Recording
+from sea_ident.robot import load_robot
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return load_robot("exo_leg")
+
+
+@pytest.fixture(scope="module")
+def recording(leg):
+    truth = truth_of(leg, leg_series(), samples=1000)
+    return record(leg, truth, 4, torque_noise=0.05, encoder_noise=1e-5)
+
+
+def found(leg, recording: Recording, **columns: np.ndarray) -> list[str]:
+    changed = recording.replace_columns(columns)
+    kinds = ("q", "theta", "tau_motor")
+    return doubts(changed, leg, *(changed.channel(kind, leg.joint_names) for kind in kinds))
+
+
+def test_a_sound_recording_raises_no_doubt(leg, recording):
+    assert found(leg, recording) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "expected"),
+    [
+        ("q_knee", 180.0 / np.pi, "is it in degrees? Then say ColumnSource('q_knee', unit='deg')"),
+        ("q_knee", 1e4, "counts of the encoder"),
+        ("theta_knee", 180.0 / np.pi, "theta_knee moves .. is it in degrees"),
+        ("theta_knee", -1.0, "has one of the two the wrong sign"),
+        ("theta_knee", 100.0, "is it the angle before the gear .. 'theta_knee=theta_knee,gear_ratio=100'"),
+        ("theta_knee", 7.0, "are both of this joint, in one unit"),
+        ("tau_motor_knee", 1000.0, "tau_motor_knee reaches .. whose limit is .. in another unit"),
+    ],
+)
+def test_a_wrong_unit_or_side_is_said_with_what_to_do(leg, recording, column, factor, expected):
+    said = found(leg, recording, **{column: factor * recording.columns[column]})
+    assert all(part in said[0] for part in (column, *expected.split(" .. "))), said
+
+
+def test_a_motion_somewhat_beyond_the_limits_is_a_note(leg, recording):
+    shifted = recording.replace_columns({"q_knee": recording.columns["q_knee"] + 1.0})
+    q = shifted.channel("q", leg.joint_names)
+    assert [text for text in beyond_limits(shifted, leg, q) if "q_knee goes from" in text]
+    small = 0.5 * (leg.limits.lower + leg.limits.upper) + 0.01 * q
+    assert beyond_limits(shifted, leg, small) == []
+
+
+def test_milliamperes_are_recognised_by_the_limit_of_the_torque(leg, recording):
+    actuator = leg.joints[1].actuator
+    assert actuator is not None
+    current = 1000.0 * recording.columns["tau_motor_knee"] / (actuator.gear_ratio * actuator.torque_constant)
+    columns = {name: values for name, values in recording.columns.items() if name != "tau_motor_knee"}
+    changed = Recording(recording.time, {**columns, "current_knee": current}, "test")
+    torque = np.stack([recording.columns[f"tau_motor_{name}"] for name in leg.joint_names], axis=1)
+    torque[:, 1] *= 1000.0
+    (said,) = doubts(
+        changed, leg, changed.channel("q", leg.joint_names), changed.channel("theta", leg.joint_names), torque
+    )
+    assert "--column 'current_knee=current_knee,unit=mA'" in said
+
+
+def test_a_dead_stretch_of_an_encoder_is_placed(leg, recording):
+    values = recording.columns["theta_hip"].copy()
+    values[1200:1700] = values[1200]
+    (said,) = [text for text in found(leg, recording, theta_hip=values) if "stands still" in text]
+    assert "for 500 samples from sample 1200 (time 12 s) while q_hip moves" in said
+
+
+def test_a_spike_is_placed_and_a_coarse_encoder_is_none(leg, recording):
+    values = recording.columns["q_hip"].copy()
+    values[777] += 0.5
+    (said,) = found(leg, recording, q_hip=values)
+    assert "q_hip jumps by 0.5" in said
+    assert "after sample 776" in said
+    step = np.ptp(recording.columns["q_hip"]) / 64.0
+    coarse = step * np.round(recording.columns["q_hip"] / step)
+    assert found(leg, recording, q_hip=coarse) == []
+
+
+def test_periods_with_a_gap_in_time_are_left_out_not_filled_in(leg, recording):
+    keep = np.ones(recording.samples, dtype=bool)
+    keep[1300:1600] = False
+    cut = Recording(recording.time[keep], {k: v[keep] for k, v in recording.columns.items()}, "test")
+    with pytest.warns(SeaIdentWarning, match="1 of 4 periods have a gap in time and were left out: 2"):
+        told = process(cut, leg, period=10.0)
+    assert told.periods == 3
+    whole = process(recording, leg, period=10.0)
+    phase = np.arange(told.samples) / told.samples * whole.samples
+    same = [np.interp(phase, np.arange(whole.samples), column) for column in whole.tau_motor.T]
+    np.testing.assert_allclose(told.tau_motor[:900].T, np.stack(same)[:, :900], atol=0.3)
+    keep[::1000] = True
+    for start in range(0, 4000, 1000):
+        keep[start + 100 : start + 200] = False
+    none = Recording(recording.time[keep], {k: v[keep] for k, v in recording.columns.items()}, "test")
+    with pytest.raises(RecordingError, match="every one of the 4 periods has a gap"):
+        process(none, leg, period=10.0)
+
+
+def test_coarse_current_is_not_called_saturated(leg, recording):
+    values = recording.columns["tau_motor_hip"]
+    step = np.ptp(values) / 12.0
+    process(recording.replace_columns({"tau_motor_hip": step * np.round(values / step)}), leg, period=10.0)
+
+
+def test_a_torque_sensor_is_checked_and_said_to_be_unused(leg, recording):
+    deflection = recording.columns["theta_knee"] - recording.columns["q_knee"]
+    sound = recording.replace_columns({"tau_spring_knee": 200.0 * deflection})
+    assert found(leg, sound) == []
+    (note,) = [text for text in process(sound, leg, period=10.0).notes if "tau_spring_knee" in text]
+    assert "not used" in note
+    (said,) = found(leg, recording, tau_spring_knee=-200.0 * deflection)
+    assert "tau_spring_knee falls where the deflection rises" in said
+    (said,) = found(leg, recording, tau_spring_knee=np.full(recording.samples, 3.0))
+    assert "is the sensor dead" in said
