@@ -10,7 +10,7 @@ from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import off, solve
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Whitening
@@ -26,10 +26,8 @@ LEAST_STIFFNESS = 0.02
 WHITENINGS_KEPT = 3
 """Noise floors of which whitened columns are kept."""
 
-NOISE_ROUNDS = 2
-"""Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by. No more than
-that: what is left of friction at reversals that differs from pass to pass goes where the weight is small, which makes
-the weight there still smaller."""
+NOISE_ROUNDS = 3
+"""Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by."""
 
 RUNAWAY = 0.3
 """Share of the torque of the motor beyond which an effect must not grow ..."""
@@ -39,6 +37,10 @@ RUNAWAY_STEP = 1.2
 
 STANDS_STILL = 1e-3
 """A step of the shapes that takes less than this share of the excess was the last."""
+
+HELD = 1.0
+"""Information about a shape (for its logarithm, or as a share of its range) below which it stays where it is: noise
+would carry it anywhere, and hold up the others."""
 
 RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
@@ -57,7 +59,7 @@ class Bench(Tangents):
         self.effects = tuple(effects)
         self._target = spectrum(data.target(data.tau_motor), data.harmonics)
         self._left_out = data.left_out
-        self._free = free_samples(data.left_out, data.harmonics)
+        self._free = free_samples(data.left_out, data.harmonics, data.alike)
         self._whitenings: list[tuple[NoiseFloor | None, Whitening]] = []
         self._periods = Periods(data)
 
@@ -73,7 +75,7 @@ class Bench(Tangents):
                         left_out[:, e] |= rows
         if np.any(left_out != self._left_out):
             self._left_out, self._whitenings = left_out, []
-            self._free = free_samples(left_out, self.data.harmonics)
+            self._free = free_samples(left_out, self.data.harmonics, self.data.alike)
 
     def predicted(self, effects: Sequence[Effect], parameters: Mapping[str, float]) -> Fit:
         """A model with given parameters, nothing fitted."""
@@ -337,9 +339,8 @@ class Bench(Tangents):
         step = np.zeros(len(strength))
         # every shape in its own unit: what one does may be a thousand times what another does
         unit = across[:, seen] / strength[seen]
-        normal = unit.T @ unit + RIDGE * np.eye(int(seen.sum()))
-        step[seen] = np.linalg.solve(normal, unit.T @ fit.whitened) / strength[seen]
-        step *= min(1.0, 1.0 / max(float(np.max(np.abs(step))), 1e-300))
+        normal = unit.T @ unit + np.diag(RIDGE + HELD / strength[seen] ** 2)
+        step[seen] = np.clip(np.linalg.solve(normal, unit.T @ fit.whitened) / strength[seen], -1.0, 1.0)
         rank = fit.covariance_factor.shape[1]
         follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis[:, fit.basis.shape[1] - rank :].T @ directions)
         for _ in range(5):
@@ -374,11 +375,12 @@ class Bench(Tangents):
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor with the parameters of a fit."""
         residuals = self.period_residuals(fit)
-        noise = noise_from_periods(residuals)
+        whitener = self._plain_whitener()
         for _ in range(NOISE_ROUNDS):
-            whitening = Whitening(self, noise.whitener(), self._free)
+            whitening = Whitening(self, whitener, self._free)
             taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
-            noise = noise_beside_model(residuals, noise, np.concatenate([whitening.free, taken], axis=1))
+            noise = noise_beside_model(residuals, whitener, np.concatenate([whitening.free, taken], axis=1))
+            whitener = noise.steady_whitener()
         return noise
 
     @cached_property

@@ -45,7 +45,12 @@ UNCERTAIN_SIGN = 2.0
 """Samples slower than this many times their scatter from period to period are left out too: a mean of signs is none."""
 
 ALIKE = 0.1
-"""Combinations of samples left out that are weaker than this within the band are not freed."""
+"""Combinations of samples left out that are weaker than this within the band are not freed, so that the width of a
+sliding start of friction and what friction remembers of a reversal stay visible, ..."""
+
+BARELY_SEEN = 1e-3
+"""... but from this on where a model is judged: a jump of friction that falls between two samples is many times the
+noise."""
 
 
 class EquationKind(StrEnum):
@@ -90,6 +95,7 @@ class PeriodData:
         left_out: (N, E) samples of an equation that say nothing about a model.
         warnings: what a user should know.
         caution: how many times the usual is left out around reversals.
+        alike: combinations of samples left out that are weaker than this within the band are not freed [-].
         known: (N, E) torque that is known to act beside the model, None where there is none [N m].
     """
 
@@ -107,6 +113,7 @@ class PeriodData:
     left_out: NDArray[np.bool_]
     warnings: tuple[str, ...] = ()
     caution: int = 1
+    alike: float = ALIKE
     known: FloatArray | None = None
 
     @property
@@ -307,10 +314,10 @@ def away_from_reversals(data: PeriodData, caution: int = 2) -> PeriodData:
         samples=caution * REVERSAL_SAMPLES,
         uncertain=caution * UNCERTAIN_SIGN,
     )
-    return replace(data, left_out=data.left_out | wide, caution=caution)
+    return replace(data, left_out=data.left_out | wide, caution=caution, alike=BARELY_SEEN)
 
 
-def free_samples(left_out: NDArray[np.bool_], harmonics: int) -> NDArray[np.complex128]:
+def free_samples(left_out: NDArray[np.bool_], harmonics: int, alike: float = ALIKE) -> NDArray[np.complex128]:
     """Columns that take up whatever happens in the samples left out.
 
     A sample with a free value of its own says nothing about any other parameter. Unlike a weight of zero this leaves
@@ -319,6 +326,7 @@ def free_samples(left_out: NDArray[np.bool_], harmonics: int) -> NDArray[np.comp
     Args:
         left_out: (N, E).
         harmonics: H.
+        alike: combinations that are weaker than this within the band are not freed [-].
 
     Returns:
         (H + 1, E, m) spectra, each in one equation; neighbouring samples that look alike within the band share one.
@@ -331,7 +339,7 @@ def free_samples(left_out: NDArray[np.bool_], harmonics: int) -> NDArray[np.comp
             phase[1:] *= np.sqrt(2.0)
             real = np.concatenate([phase.real, phase.imag])
             left, strength, _ = np.linalg.svd(real, full_matrices=False)
-            for direction in left[:, strength > ALIKE * strength[0]].T:
+            for direction in left[:, strength > alike * strength[0]].T:
                 column = np.zeros((harmonics + 1, equations), dtype=np.complex128)
                 column[:, e] = direction[: harmonics + 1] + 1j * direction[harmonics + 1 :]
                 columns.append(column)
