@@ -252,7 +252,12 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
         for c, v, s in zip(effect.columns(bench.robot), trend.values, trend.stds, strict=True)
     ]
     parameters.extend(
-        MissingParameter(effect.parameter_name(s.name), float(getattr(effect, s.name)), 0.0, s.unit)
+        MissingParameter(
+            effect.parameter_name(s.name),
+            float(getattr(effect, s.name)),
+            trend.time_constant_std if s.name == "time_constant" else 0.0,
+            s.unit,
+        )
         for s in effect.shapes
     )
     others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
