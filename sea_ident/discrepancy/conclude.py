@@ -27,6 +27,7 @@ from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects.signal import SignalEffect
 
@@ -108,9 +109,10 @@ def conclude(
         verdict=verdict,
         text=words.paragraph(facts),
         lack_of_fit=LackOfFit(
-            statistic, dof, p_value, trends.p_value, _per_joint(bench, start.fit, start.noise), remainder
+            statistic, dof, p_value, trends.p_value, _per_joint(confirmed.bench, confirmed.start), remainder
         ),
-        locations=locate(bench, start.fit, start.noise),
+        # of what is tested: away from the reversals, where the mean of signs is no model
+        locations=locate(confirmed.bench, confirmed.start.fit, confirmed.start.noise),
         missing=tuple(missing),
         training=gap,
         holdout=held_gap,
@@ -273,9 +275,9 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
     )
 
 
-def _per_joint(bench: Bench, fit: Fit, noise: NoiseFloor) -> dict[str, dict[str, float]]:
+def _per_joint(bench: Bench, settled: Settled) -> dict[str, dict[str, float]]:
     """Energy of the residual over that of the noise by joint and equation."""
-    clean = np.sum(np.abs(bench.clean_residual(fit)) ** 2, axis=0)
+    clean, noise = np.sum(np.abs(bench.clean_residual(settled.fit)) ** 2, axis=0), settled.noise
     out: dict[str, dict[str, float]] = {joint: {} for joint in bench.robot.joint_names}
     for e, equation in enumerate(bench.data.equations):
         out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise.std[e] ** 2, 1e-300))
