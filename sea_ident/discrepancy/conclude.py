@@ -1,5 +1,7 @@
 """What a search, its confirmation and the held-out data add up to: the verdict and its evidence."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sea_ident._typing import FloatArray
@@ -95,7 +97,11 @@ def conclude(
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     holds = held_gap is None or explains(gap, held_gap)
+    sound = notes
     notes = check.drowned(notes, gap, _torque_by_joint(bench))
+    lost = notes is not sound
+    if lost:
+        remainder = 0.0
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
@@ -105,7 +111,7 @@ def conclude(
         units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
         other_motion=held is not None and held.other_motion,
     )  # fmt: skip
-    return Diagnosis(
+    found = Diagnosis(
         verdict=verdict,
         text=words.paragraph(facts),
         lack_of_fit=LackOfFit(
@@ -122,6 +128,17 @@ def conclude(
         recording=bench.data.source,
         holdout_source=None if held is None else held.source,
     )
+    return without_sizes(found) if lost else found
+
+
+def without_sizes(diagnosis: Diagnosis) -> Diagnosis:
+    """A diagnosis of data of which nothing can be told: no gap, no place and no name, whose numbers would be absurd."""
+    return replace(
+        diagnosis,
+        lack_of_fit=replace(diagnosis.lack_of_fit, per_joint={}, remainder=0.0),
+        locations=(), missing=(), training=None, holdout=None, simulation_gap={}, detectability=(), model=None,
+        waveforms=None,
+    )  # fmt: skip
 
 
 def unexplained(confirmed: Confirmed) -> bool:
