@@ -1,5 +1,7 @@
 """The border of the functions for users: an argument of another kind is named with what gives the right one."""
 
+from numbers import Real
+
 from sea_ident.exceptions import SeaIdentError
 
 _GIVEN_BY = {
@@ -29,3 +31,18 @@ def expect(value: object, where: str, *kinds: type) -> None:
     sources = [_GIVEN_BY[name] for name in names if name in _GIVEN_BY]
     hint = f"; {' or '.join(sources)} gives one" if sources else ""
     raise SeaIdentError(f"{where} must be a {' or a '.join(names)}, not a {type(value).__name__}{hint}")
+
+
+def expect_number(value: object, where: str, unit: str) -> None:
+    """Refuse an argument that is neither a number nor None.
+
+    Args:
+        value: the argument.
+        where: function and name of the argument, for the message.
+        unit: of the number, for the message.
+
+    Raises:
+        SeaIdentError: it is something else.
+    """
+    if value is not None and (not isinstance(value, Real) or isinstance(value, bool)):
+        raise SeaIdentError(f"{where} must be a number [{unit}] or None, not a {type(value).__name__}, {value!r}")

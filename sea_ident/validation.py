@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect
+from sea_ident.arguments import expect, expect_number
 from sea_ident.estimation import Agreement, Model
 from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.observations import friction_is_modelled
@@ -38,6 +38,7 @@ class Validation:
         used: (N,) which samples were compared.
         agreement: residual away from reversals beside its noise; None where one period says nothing of noise.
         warnings: what a user should know.
+        units: (n,) unit of the torque of each joint.
     """
 
     recording: str
@@ -52,14 +53,16 @@ class Validation:
     used: NDArray[np.bool_]
     agreement: Agreement | None = None
     warnings: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
     def summary(self) -> str:
         """One line per joint."""
         lines = [f"prediction of {self.recording}, {self.samples} samples"]
         away = None if self.agreement is None else self.agreement.words()
         for i, name in enumerate(self.joint_names):
+            joint = f"{name} [{self.units[i]}]" if self.units else name
             lines.append(
-                f"  {name}: rms {self.rms[i]:.4g} of {self.rms_torque[i]:.4g} ({100 * self.nrms[i]:.2f} %), noise "
+                f"  {joint}: rms {self.rms[i]:.4g} of {self.rms_torque[i]:.4g} ({100 * self.nrms[i]:.2f} %), noise "
                 f"{self.noise_std[i]:.3g}{'' if away is None else away[i]}"
             )
         lines.extend(f"  warning: {text}" for text in self.warnings)
@@ -111,6 +114,7 @@ def validate(
     """
     expect(model, "validate: model", Model)
     expect(recording, "validate: recording", Recording, ProcessedRecording)
+    expect_number(period, "validate: period", "s")
     tell = progress or (lambda what, share: None)
     tell("averaging the periods", 0.0)
     if isinstance(recording, ProcessedRecording):
@@ -159,6 +163,7 @@ def validate(
         used=used,
         agreement=agreement(apart, np.array(each), counted),
         warnings=tuple(found),
+        units=tuple(joint.torque_unit for joint in model.robot.joints),
     )
 
 

@@ -34,6 +34,8 @@ RECORDING = Recording(np.arange(9.0), {"q_hip": np.arange(9.0)}, "test")
         (lambda: validate(RECORDING, LEG), r"must be a Model, not a Recording; identify"),
         (lambda: diagnose("model.json", RECORDING), r"must be a Model, not a str; .*read_model"),
         (lambda: process(LEG, RECORDING), r"must be a Recording, not a Robot"),
+        (lambda: identify(LEG, RECORDING, period="10"), r"identify: period must be a number \[s\] .*not a str, '10'"),
+        (lambda: process(RECORDING, LEG, period="10 s"), r"process: period must be a number \[s\]"),
         (lambda: export_urdf("out.urdf", LEG), r"must be a Model, not a str"),
         (lambda: write_report("out.html", LEG), r"must be a Model or a Diagnosis, not a str"),
         (lambda: write_recording("out.csv", RECORDING), r"must be a Recording, not a str"),

@@ -146,6 +146,16 @@ def test_simulate_writes_the_columns_that_identify_reads(chain):
     )
 
 
+def test_simulate_takes_a_sampling_rate(chain, tmp_path):
+    folder, _ = chain
+    begin = ("simulate", "exo_leg", "--excitation", folder / "exc.json", "--periods", 1, "--out", tmp_path / "rec.csv")
+    record = call_json(*begin, "--rate", 80)
+    assert (record["samples"], record["sample_rate"]) == (5 * 80, pytest.approx(80.0))
+    done = call(*begin, "--rate", 0)
+    assert done.returncode == 2
+    assert "rate 0.0 Hz" in done.stderr
+
+
 def test_identify_finds_the_leg_that_was_simulated(chain):
     folder, said = chain
     model = json.loads((folder / "model.json").read_text())

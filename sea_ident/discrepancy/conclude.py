@@ -1,5 +1,7 @@
 """What a search, its confirmation and the held-out data add up to: the verdict and its evidence."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sea_ident._typing import FloatArray
@@ -27,6 +29,7 @@ from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects.signal import SignalEffect
 
@@ -94,7 +97,11 @@ def conclude(
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     holds = held_gap is None or explains(gap, held_gap)
+    sound = notes
     notes = check.drowned(notes, gap, _torque_by_joint(bench))
+    lost = notes is not sound
+    if lost:
+        remainder = 0.0
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
@@ -104,13 +111,14 @@ def conclude(
         units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
         other_motion=held is not None and held.other_motion,
     )  # fmt: skip
-    return Diagnosis(
+    found = Diagnosis(
         verdict=verdict,
         text=words.paragraph(facts),
         lack_of_fit=LackOfFit(
-            statistic, dof, p_value, trends.p_value, _per_joint(bench, start.fit, start.noise), remainder
+            statistic, dof, p_value, trends.p_value, _per_joint(confirmed.bench, confirmed.start), remainder
         ),
-        locations=locate(bench, start.fit, start.noise),
+        # of what is tested: away from the reversals, where the mean of signs is no model
+        locations=locate(confirmed.bench, confirmed.start.fit, confirmed.start.noise),
         missing=tuple(missing),
         training=gap,
         holdout=held_gap,
@@ -120,6 +128,17 @@ def conclude(
         recording=bench.data.source,
         holdout_source=None if held is None else held.source,
     )
+    return without_sizes(found) if lost else found
+
+
+def without_sizes(diagnosis: Diagnosis) -> Diagnosis:
+    """A diagnosis of data of which nothing can be told: no gap, no place and no name, whose numbers would be absurd."""
+    return replace(
+        diagnosis,
+        lack_of_fit=replace(diagnosis.lack_of_fit, per_joint={}, remainder=0.0),
+        locations=(), missing=(), training=None, holdout=None, simulation_gap={}, detectability=(), model=None,
+        waveforms=None,
+    )  # fmt: skip
 
 
 def unexplained(confirmed: Confirmed) -> bool:
@@ -252,7 +271,12 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
         for c, v, s in zip(effect.columns(bench.robot), trend.values, trend.stds, strict=True)
     ]
     parameters.extend(
-        MissingParameter(effect.parameter_name(s.name), float(getattr(effect, s.name)), 0.0, s.unit)
+        MissingParameter(
+            effect.parameter_name(s.name),
+            float(getattr(effect, s.name)),
+            trend.time_constant_std if s.name == "time_constant" else 0.0,
+            s.unit,
+        )
         for s in effect.shapes
     )
     others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
@@ -268,9 +292,9 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
     )
 
 
-def _per_joint(bench: Bench, fit: Fit, noise: NoiseFloor) -> dict[str, dict[str, float]]:
+def _per_joint(bench: Bench, settled: Settled) -> dict[str, dict[str, float]]:
     """Energy of the residual over that of the noise by joint and equation."""
-    clean = np.sum(np.abs(bench.clean_residual(fit)) ** 2, axis=0)
+    clean, noise = np.sum(np.abs(bench.clean_residual(settled.fit)) ** 2, axis=0), settled.noise
     out: dict[str, dict[str, float]] = {joint: {} for joint in bench.robot.joint_names}
     for e, equation in enumerate(bench.data.equations):
         out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise.std[e] ** 2, 1e-300))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect
+from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
@@ -72,6 +72,7 @@ def diagnose(
     """
     expect(model, "diagnose: model", Model)
     expect(recording, "diagnose: recording", Recording, ProcessedRecording)
+    expect_number(period, "diagnose: period", "s")
     tell = progress or (lambda what, share: None)
     tell("reading the periods", 0.0)
     robot = model.robot
@@ -120,7 +121,8 @@ def diagnose(
     notes = replace(notes, warnings=(*notes.warnings, *found.notes, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes)
-    diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
+    if diagnosis.training is not None:
+        diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)

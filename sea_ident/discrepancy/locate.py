@@ -2,13 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import EquationKind, waveform
 from sea_ident.discrepancy.findings import Location
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, stacked, step_freedom, unstacked
 
 SIGNIFICANT = 5.0
 """Locations below this z-score are not told."""
@@ -18,25 +19,54 @@ MOST = 60
 
 
 def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
-    """Excess energy of the mean residual by joint, equation and regime, the strongest first."""
+    """Excess energy of the mean residual by joint, equation and regime, the strongest first.
+
+    The noise of a regime is that of the noise floor, or what the periods scatter by in this very regime, whichever is
+    more; friction that differs from pass to pass scatters more at reversals, and in a few directions only.
+    """
     data = bench.data
     residual = waveform(bench.clean_residual(fit), data.samples)
+    scatter = _scatter(bench, fit, noise)
     found = []
     numbers = 2 * data.harmonics + 1
     for e, equation in enumerate(data.equations):
         keep = ~data.left_out[:, e]
-        variance = float(noise.std[e] ** 2)
+        share = _filled(scatter[:, keep, e], numbers * float(np.mean(keep)))
         for regime, chosen in regimes(bench, equation.index).items():
             part = chosen & keep
             count = numbers * float(np.count_nonzero(part)) / data.samples
             if count < 4.0:
                 continue
+            variance, own = float(noise.std[e] ** 2), scatter[:, part, e]
+            if data.periods > 1:
+                variance = max(variance, float(np.mean(np.diff(own, axis=0) ** 2)) / (2.0 * data.periods))
             power = float(np.mean(residual[part, e] ** 2))
-            z = (power / variance - 1.0) * np.sqrt(count / 2.0)
-            if z > SIGNIFICANT:
+            z = (power / variance - 1.0) * np.sqrt(share * count / 2.0)
+            # of few directions the energy has a long tail: as rare as the z-score would be of many
+            directions = min(share, _filled(own, count)) * count
+            chance = stats.f.sf(power / variance, directions, directions * step_freedom(data.periods))
+            if z > SIGNIFICANT and chance < stats.norm.sf(SIGNIFICANT):
                 label = _label(bench, residual, e, part)
                 found.append(Location(equation.joint, label, regime, float(np.sqrt(power - variance)), float(z)))
     return tuple(sorted(found, key=lambda x: -x.z)[:MOST])
+
+
+def _filled(scatter: FloatArray, count: float) -> float:
+    """Share of the directions of this many numbers that the scatter of periods (P, ...) fills evenly [-]."""
+    return min(noise_directions(scatter), count) / count if len(scatter) > 1 and count > 0.0 else 1.0
+
+
+def _scatter(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
+    """(P, N, E) residuals of the periods, without what the samples that are left out put into them [N m]."""
+    count = len(bench.data.equations)
+    flat = np.stack([stacked(residual / fit.scale) for residual in bench.period_residuals(fit)])
+    free = bench.free_basis(noise)
+    if free.shape[1]:
+        # the same span, not whitened: as in the residual of the mean
+        plain = np.matmul(np.linalg.inv(bench.whitener(noise)), unstacked(free, count))
+        basis = np.linalg.qr(stacked(plain))[0]
+        flat = flat - (flat @ basis) @ basis.T
+    return np.stack([waveform(unstacked(values, count), bench.data.samples) for values in flat])
 
 
 def regimes(bench: Bench, joint: int) -> dict[str, NDArray[np.bool_]]:

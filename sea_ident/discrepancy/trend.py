@@ -12,6 +12,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_directions, step_freedom
+from sea_ident.discrepancy.trend_values import Course, bend, course_values, time_constants
 from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.exceptions import EffectError
@@ -45,11 +46,12 @@ class Trend:
     Attributes:
         effect: the effect.
         values: (k,) its parameters.
-        stds: (k,) their standard deviations.
+        stds: (k,) their standard deviations, with that of the time constant in them.
         gain: drop of the statistic of the comparison of periods.
         p_value: corrected for all that was tried.
         torque_change: rms over periods of the change, as a share of the torque [-].
         alternatives: others that explain the same, with the share of it that they explain.
+        time_constant_std: standard deviation of the time constant [s]; 0 where there is none or the course is straight.
     """
 
     effect: Effect
@@ -59,6 +61,7 @@ class Trend:
     p_value: float
     torque_change: float
     alternatives: tuple[tuple[Effect, float], ...] = ()
+    time_constant_std: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,10 @@ class TrendTest:
 
 @dataclass(frozen=True, eq=False)
 class _Direction:
-    """A trend as columns: profile over the periods, whitened columns and a basis of them, which columns they are."""
+    """A trend as columns: profile over the periods, whitened columns and a basis of them, which columns they are.
+
+    A profile that is bent has its change with the logarithm of the time constant beside it.
+    """
 
     effect: Effect
     profile: FloatArray
@@ -88,11 +94,12 @@ class _Direction:
     basis: FloatArray
     used: tuple[int, ...]
     count: int
+    bend: FloatArray | None = None
 
     def over(self, periods: slice) -> "_Direction":
         """The same in a part of the periods."""
-        profile = self.profile[periods]
-        return replace(self, profile=profile - profile.mean())
+        profile, bent = self.profile[periods], None if self.bend is None else self.bend[periods]
+        return replace(self, profile=profile - profile.mean(), bend=None if bent is None else bent - bent.mean())
 
 
 def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: FloatArray | None = None) -> TrendTest:
@@ -223,8 +230,9 @@ def _directions(
             own = own if np.all(np.isfinite(own)) else None
         try:
             spectra = bench.spectra_of(effect.steady(state), fit.effects) * fit.scale[:, None]
-            variants = [replace(effect, time_constant=c) for c in _time_constants(effect, middle)]  # type: ignore[call-arg]
+            variants = [replace(effect, time_constant=c) for c in time_constants(effect, middle)]  # type: ignore[call-arg]
             changes = [v.change(middle, own) for v in variants]
+            bends = [bend(v, middle, own) if v is not variants[-1] else None for v in variants]
         except EffectError:
             continue
         columns = whiten(whitener, spectra)
@@ -235,22 +243,14 @@ def _directions(
         count = columns.shape[1]
         choices = [tuple(range(count)), *((k,) for k in range(count) if count > 1)]
         bases = [np.linalg.qr((columns / norms)[:, used])[0] for used in choices]
-        for variant, change in zip(variants, changes, strict=True):
+        for variant, change, bent in zip(variants, changes, bends, strict=True):
             profile = change - change.mean()
             if np.linalg.norm(profile) > 1e-12:
                 found.extend(
-                    _Direction(variant, profile, columns[:, used], basis, used, count)
+                    _Direction(variant, profile, columns[:, used], basis, used, count, bent)
                     for used, basis in zip(choices, bases, strict=True)
                 )
     return found
-
-
-def _time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]:
-    """Time constants worth trying in a recording of this length."""
-    if not any(shape.name == "time_constant" for shape in getattr(effect, "shapes", ())):
-        return (getattr(effect, "time_constant", 0.0),)
-    length = float(middle[-1] + middle[0])
-    return tuple(float(c) for c in (*np.geomspace(0.1 * length, 0.8 * length, 13), 20.0 * length))
 
 
 def _gain(flat: FloatArray, direction: _Direction) -> float:
@@ -367,9 +367,9 @@ def _trend(
     others: list[_Direction],
 ) -> Trend:
     left = flat - _explained(flat, others) if others else flat
-    size = np.linalg.norm(direction.profile)
-    stds = np.zeros(direction.count)
-    stds[list(direction.used)] = np.linalg.norm(np.linalg.pinv(direction.columns), axis=1) / size
+    own, *_ = course_values(flat, [Course(d.profile, d.columns, d.bend) for d in (direction, *others)])
+    values, stds = np.zeros(direction.count), np.zeros(direction.count)
+    values[list(direction.used)], stds[list(direction.used)] = own.values, own.stds
     alternatives: dict[tuple[str, str | None], tuple[Effect, float]] = {}
     explained = _explained(left, [direction])
     for other in directions:
@@ -384,10 +384,11 @@ def _trend(
             alternatives[key] = (other.effect, share)
     return Trend(
         effect=direction.effect,
-        values=_values(left, direction),
+        values=values,
         stds=stds,
         gain=gain,
         p_value=p_value,
         torque_change=_change(bench, left, direction, len(flat)),
         alternatives=tuple(sorted(alternatives.values(), key=lambda a: -a[1])),
+        time_constant_std=getattr(direction.effect, "time_constant", 0.0) * own.bend_std,
     )

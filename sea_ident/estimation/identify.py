@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect
+from sea_ident.arguments import expect, expect_number
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
 from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.base import Side
@@ -89,6 +89,7 @@ def identify(
     """
     expect(robot, "identify: robot", Robot)
     expect(recording, "identify: recording", Recording, ProcessedRecording)
+    expect_number(period, "identify: period", "s")
     for each in effects or ():
         expect(each, "identify: each of effects", Effect)
     tell = progress or (lambda what, share: None)

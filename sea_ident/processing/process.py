@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect
+from sea_ident.arguments import expect, expect_number
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
@@ -69,6 +69,7 @@ def process(
     """
     expect(recording, "process: recording", Recording)
     expect(robot, "process: robot", Robot)
+    expect_number(period, "process: period", "s")
     signals = _signals(recording, robot)
     uniform = recording.is_uniform
     if period is None:

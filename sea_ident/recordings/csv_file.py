@@ -1,10 +1,14 @@
 """CSV: one header row with the column names, then one row of numbers per sample, separated by commas."""
 
 import csv
+import gzip
 import io
-from collections.abc import Collection
-from contextlib import suppress
+import zlib
+from collections.abc import Callable, Collection
+from contextlib import AbstractContextManager, suppress
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +43,29 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
         RecordingError: not a CSV file with a header of names and rows of numbers; says the line and column.
     """
     check_size(_COPIES * path.stat().st_size, memory_limit, path)
-    text = _decode(path)
+    return _table(path.read_bytes(), partial(open, path, encoding="utf-8-sig"), names, path)
+
+
+def read_packed_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> RawTable:
+    """Read the columns of a CSV file that gzip packed; as `read_csv`.
+
+    Raises:
+        RecordingError: also if it cannot be unpacked, or takes more than the limit then.
+    """
+    most = memory_limit // _COPIES
+    try:
+        with gzip.open(path) as file:
+            data = file.read(most + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise RecordingError(f"{path}: cannot be unpacked, it is damaged or no gzip file: {error}") from error
+    check_size(_COPIES * len(data), memory_limit, path)
+    return _table(data, partial(gzip.open, path, "rt", encoding="utf-8-sig"), names, path)
+
+
+def _table(
+    data: bytes, opened: Callable[[], AbstractContextManager[Any]], names: Collection[str] | None, path: Path
+) -> RawTable:
+    text = _decode(data, path)
     header, start, first_line = _header(text, path)
     wanted = [i for i, name in enumerate(header) if is_wanted(name, names)]
     if not wanted:
@@ -51,7 +77,7 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
         raise RecordingError(f"{path}: a header, but no rows of numbers")
     table = None
     if '"' not in body and _rectangular(body, len(header)):
-        with suppress(ValueError), open(path, encoding="utf-8-sig") as file:
+        with suppress(ValueError), opened() as file:
             table = np.loadtxt(
                 file,
                 delimiter=",",
@@ -81,8 +107,7 @@ def write_csv(recording: Recording, path: Path) -> None:
             file.write("\n".join([",".join(map(repr, row)) for row in rows]) + "\n")
 
 
-def _decode(path: Path) -> str:
-    data = path.read_bytes()
+def _decode(data: bytes, path: Path) -> str:
     if not data:
         raise RecordingError(f"{path}: the file is empty")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):

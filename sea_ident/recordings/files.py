@@ -51,6 +51,8 @@ _FORMATS = {
     ".db3": _Format("ros_reader:read_ros2_bag", "ros_writer:write_sqlite_file"),
 }
 
+_PACKED_CSV = _Format("csv_file:read_packed_csv", "csv_file:write_csv")
+
 SUFFIXES = tuple(_FORMATS)
 """Suffixes that are read and written; a ROS 2 bag is a folder."""
 
@@ -65,7 +67,8 @@ def read_recording(
     """Read a recording; the suffix decides the format, and a folder is a ROS 2 bag.
 
     Args:
-        path: The file: `.csv`, `.npz`, `.mat`, `.parquet`, `.h5`, `.hdf5`, `.bag`, `.mcap`, `.db3`, or a folder.
+        path: The file: `.csv`, also packed as `.csv.gz`, `.npz`, `.mat`, `.parquet`, `.h5`, `.hdf5`, `.bag`, `.mcap`,
+            `.db3`, or a folder.
         columns: Column of the recording -> name in the file, or `ColumnSource` with its unit, gear and so on.
             One `*` on both sides stands for the same text: `{"q_*": ColumnSource("pos_*", unit="deg")}`. Columns
             of the file that bear a name of the project already need no entry.
@@ -153,11 +156,12 @@ def _format(path: Path) -> _Format:
         near = sorted(other.name for other in path.parent.glob("*") if other.suffix in SUFFIXES)[:10]
         hint = f"; that folder has {', '.join(near)}" if near else ""
         raise RecordingError(f"{path}: no such file{hint}")
-    if path.suffix.lower() not in _FORMATS:
+    packed = path.name.lower().endswith(".csv.gz")
+    if not packed and path.suffix.lower() not in _FORMATS:
         raise RecordingError(_unknown_suffix(path))
     if path.stat().st_size == 0:
         raise RecordingError(f"{path}: the file is empty")
-    return _FORMATS[path.suffix.lower()]
+    return _PACKED_CSV if packed else _FORMATS[path.suffix.lower()]
 
 
 @contextmanager

@@ -34,7 +34,7 @@ def bars(
     def y(value: float) -> float:
         return _TOP + inner * (1.0 - value / top)
 
-    out = [f'<svg class="bars" viewBox="0 0 {width} {_HEIGHT}" style="max-width:{width}px" role="img" ']
+    out = [f'<svg class="bars" viewBox="0 0 {width} {_HEIGHT}" style="max-width:{width}px;--own:{width}px" role="img" ']
     out.append(f'aria-label="{escape(title)}"><text class="chart-title" x="{_LEFT}" y="14">{escape(title)}</text>')
     out.append('<g class="ticks">')
     for tick in nice_ticks(0.0, top, 4):

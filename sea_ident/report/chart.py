@@ -98,7 +98,7 @@ class Chart:
         (x0, x1), (y0, y1) = self._windows()
         to_x, to_y = _Scale(x0, x1, GRID), _Scale(y1, y0, GRID)
         out = [
-            f'<svg class="chart" viewBox="0 0 {self.width} {self.height}" role="img" '
+            f'<svg class="chart" viewBox="0 0 {self.width} {self.height}" style="--own:{self.width}px" role="img" '
             f'aria-label="{escape(self.title or self.y_label)}" data-link="{escape(self.link)}" '
             f'data-window="{x0:.9g} {x1:.9g} {y0:.9g} {y1:.9g}" '
             f'data-frame="{left} {top} {inner_width} {inner_height}">'

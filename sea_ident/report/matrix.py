@@ -32,7 +32,7 @@ def matrix(
     bottom = CHARACTER * 0.72 * max(map(len, columns)) + 16
     width, height = left + len(columns) * cell + 4, len(rows) * cell + bottom
     out = [f'<svg class="matrix" viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{escape(label)}"']
-    out.append(f' style="max-width:{width:.0f}px">')
+    out.append(f' style="max-width:{width:.0f}px;--own:{width:.0f}px">')
     for i, name in enumerate(rows):
         out.append(f'<text class="ty" x="{left - 6:.0f}" y="{(i + 0.5) * cell + 4:.1f}">{escape(name)}</text>')
     for j, name in enumerate(columns):

@@ -12,6 +12,9 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.conclude import without_sizes
+from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
+from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
 from sea_ident.exceptions import SeaIdentWarning
 
@@ -53,6 +56,21 @@ class CrossedFriction(Effect):
             motor[i] += float(values[0] * self.form(np.asarray(state.theta), np.asarray(state.dtheta), i, k))
 
         return act
+
+
+def test_where_nothing_can_be_told_no_size_is_told(tmp_path):
+    """A joint that friction holds: noise of 5e21 N m, in which every other number drowns."""
+    gap = Gap({"hip": 2.56e19}, {"hip": 2.55e19}, {"hip": 4.9e21})
+    effect = MissingEffect("torque_ripple", "hip", (), 3e18, 0.0, ())
+    place = Location("hip", "link", "slow", 1e29, 200.0)
+    lack = LackOfFit(1300.0, 1376, 0.87, 1.0, {"hip": {"motor": 1e58}}, 3e18)
+    full = Diagnosis(Verdict.CANNOT_TELL, "Nothing.", lack, (place,), (effect,), gap, gap, warnings=("held",))
+    assert "e+" in full.summary()
+    bare = without_sizes(full)
+    assert bare.summary() == "cannot_tell: Nothing.\n  warning: held"
+    bare.save(tmp_path / "d.json")
+    assert "e+" not in (tmp_path / "d.json").read_text()
+    assert read_diagnosis(tmp_path / "d.json").summary() == bare.summary()
 
 
 def diagnosed(laboratory, recording, **options):

@@ -68,6 +68,35 @@ def test_in_a_part_of_the_motion(nothing_missing, regime):
     assert own[regime].excess_rms == pytest.approx(max(p.excess_rms for p in own.values()), rel=0.15)
 
 
+def test_nothing_is_told_of_what_is_within_the_scatter_of_the_periods_there(nothing_missing, monkeypatch):
+    """Torque at low speed that differs from pass to pass leaves a mean there; the same in every pass is told."""
+    bench, now = nothing_missing
+    knee, e = bench.robot.index("knee"), index(bench, "knee", "motor")
+    assert locate(bench, now.fit, now.noise) == ()
+    slow = np.flatnonzero(regimes(bench, knee)["slow"] & ~bench.data.left_out[:, e])
+    wave = np.zeros((bench.data.periods, bench.data.samples, len(bench.data.equations)))
+    phase = np.random.default_rng(5).standard_normal((bench.data.periods, 1))
+    wave[:, slow, e] = SIZE * np.sqrt(2.0) * (1.0 + 2.0 * phase)
+    extra = np.stack([spectrum(w, bench.data.harmonics) for w in wave])
+    wrong = replace(now.fit, residual=now.fit.residual + extra.mean(axis=0))
+    own = bench.period_residuals(now.fit)
+
+    def places(each):
+        monkeypatch.setattr(bench, "period_residuals", lambda fit: own + each * fit.scale)
+        return {(p.joint, p.equation, p.regime) for p in locate(bench, wrong, now.noise)}
+
+    assert ("knee", "motor", "slow") in places(np.broadcast_to(extra.mean(axis=0), extra.shape))
+    assert places(extra) == set()
+
+
+def test_what_is_missing_is_told_where_it_is(rippled):
+    bench, without, with_it = rippled
+    before = locate(bench, without.fit, without.noise)
+    assert {p.joint for p in before[:3]} == {"hip"}
+    assert before[0].excess_rms == pytest.approx(np.hypot(1.0, 0.5) / np.sqrt(2.0), rel=0.5)
+    assert not {p for p in locate(bench, with_it.fit, with_it.noise) if p.z > 10.0}
+
+
 def test_regimes_say_what_they_are(nothing_missing):
     bench, _ = nothing_missing
     knee = bench.robot.index("knee")

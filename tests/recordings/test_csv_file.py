@@ -1,4 +1,5 @@
 import csv
+import gzip
 
 import numpy as np
 import pytest
@@ -43,6 +44,39 @@ def test_harmless_variants_read_the_same(read, text):
     assert leg.time.tolist() == [0.0, 0.05, 0.1]
     assert leg.columns["q_hip"].tolist() == [1.0, -3.5, 5.0]
     assert leg.columns["current_hip"].tolist() == [2.0, 4.0, 6.0]
+
+
+def test_a_packed_file_reads_as_its_contents(tmp_path, read):
+    plain = sample_recording()
+    write_recording(plain, tmp_path / "leg.csv")
+    packed = tmp_path / "Leg.CSV.gz"
+    packed.write_bytes(gzip.compress((tmp_path / "leg.csv").read_bytes()))
+    again = read_recording(packed)
+    np.testing.assert_array_equal(again.time, plain.time)
+    assert again.columns.keys() == plain.columns.keys()
+    for name, values in plain.columns.items():
+        np.testing.assert_array_equal(again.columns[name], values)
+
+
+def test_packed_files_that_are_none_are_refused(tmp_path):
+    path = tmp_path / "leg.csv.gz"
+    whole = gzip.compress(FINE.encode() * 50)
+    for data, expected in (
+        (FINE.encode(), "cannot be unpacked"),
+        (whole[:-12], "cannot be unpacked"),
+        (whole[:20] + b"\xff\xff" + whole[22:], "cannot be unpacked"),
+        (gzip.compress(b"\0\1\2"), "binary data"),
+        (gzip.compress(b""), "the file is empty"),
+    ):
+        path.write_bytes(data)
+        with pytest.raises(RecordingError, match=rf"leg.csv.gz.*{expected}"):
+            read_recording(path)
+    # a megabyte of one number out of a kilobyte: no more is unpacked than may be held
+    path.write_bytes(gzip.compress(b"time,q_hip\n" + b"0,0\n" * 250_000))
+    with pytest.raises(RecordingError, match="raise memory_limit"):
+        read_recording(path, memory_limit=100_000)
+    with pytest.raises(RecordingError, match=r"'\.gz' is a packed file"):
+        write_recording(sample_recording(), path)
 
 
 def test_clean_files_are_parsed_by_numpy_alone(read, monkeypatch):

@@ -17,6 +17,9 @@ def simulate(
     ],
     out: Annotated[Path, typer.Option("--out", metavar="REC.csv", help="Recording to write.", show_default=False)],
     periods: Annotated[int, typer.Option("--periods", min=1, help="Periods to record.")] = 20,
+    rate: Annotated[
+        float, typer.Option("--rate", metavar="HZ", help="Samples per second [Hz]; a whole number per period is taken.")
+    ] = 200.0,
     seed: Seed = 0,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
@@ -40,7 +43,7 @@ def simulate(
         def count(done: int) -> None:
             tell(done, f"period {min(done + 1, periods)} of {periods}")
 
-        result = run(loaded, reference, periods=periods, seed=seed, progress=count)
+        result = run(loaded, reference, periods=periods, rate=rate, seed=seed, progress=count)
     write_recording(result.recording, out)
     record = {
         "robot": loaded.name,
