@@ -10,7 +10,7 @@ from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import off, solve
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, stacked
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Whitening
@@ -26,8 +26,10 @@ LEAST_STIFFNESS = 0.02
 WHITENINGS_KEPT = 3
 """Noise floors of which whitened columns are kept."""
 
-NOISE_ROUNDS = 3
-"""Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by."""
+NOISE_ROUNDS = 2
+"""Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by. No more than
+that: what is left of friction at reversals that differs from pass to pass goes where the weight is small, which makes
+the weight there still smaller."""
 
 RUNAWAY = 0.3
 """Share of the torque of the motor beyond which an effect must not grow ..."""
@@ -375,12 +377,11 @@ class Bench(Tangents):
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor with the parameters of a fit."""
         residuals = self.period_residuals(fit)
-        whitener = self._plain_whitener()
+        noise = noise_from_periods(residuals)
         for _ in range(NOISE_ROUNDS):
-            whitening = Whitening(self, whitener, self._free)
+            whitening = Whitening(self, noise.whitener(), self._free)
             taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
-            noise = noise_beside_model(residuals, whitener, np.concatenate([whitening.free, taken], axis=1))
-            whitener = noise.steady_whitener()
+            noise = noise_beside_model(residuals, noise, np.concatenate([whitening.free, taken], axis=1))
         return noise
 
     @cached_property

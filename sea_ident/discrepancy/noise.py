@@ -1,6 +1,6 @@
 """The noise floor, from the periods of the recording itself."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,6 @@ SMALLEST_HALF_WIDTH = 4
 
 FEWEST_STEPS = 4
 """Pairs of steps between periods from which on the spread of their energy is estimated."""
-
-STEADIER = 4
-"""Times the harmonics that correlations are averaged over where the weighting must not follow the scatter itself."""
 
 SMALLEST_REST = 0.1
 """A residual of which a model takes up more than all but this share says nothing about noise."""
@@ -51,32 +48,15 @@ class NoiseFloor:
         weight[0] = 1.0
         return np.asarray(np.sqrt(weight @ power), dtype=np.float64)
 
-    def steady_whitener(self) -> ComplexArray:
-        """(H + 1, E, E) the same with correlations that are averaged over more harmonics.
-
-        What is projected out of the scatter in this weighting depends little on that very scatter, so that what is left
-        of it is not too small.
-        """
-        size = np.sqrt(np.real(np.einsum("kee->ke", self.covariance)))
-        half = STEADIER * _half_width(self.periods, len(size), self.equations)
-        correlation = self.covariance / (size[:, :, None] * size[:, None, :])
-        return _inverse_root(_moving_mean(correlation, min(half, (len(size) - 1) // 2)), size)
-
     def whitener(self) -> ComplexArray:
         """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
         count = self.equations
         size = np.sqrt(np.maximum(np.real(np.einsum("kee->ke", self.covariance)), 1e-300))
-        correlation = self.covariance / (size[:, :, None] * size[:, None, :])
+        correlation = self.covariance / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(count)
+        triangle = np.linalg.cholesky(correlation)
         unbiased = np.sqrt(max(self.freedom - count, 1.0) / self.freedom)
-        return np.asarray(unbiased * _inverse_root(correlation, size), dtype=np.complex128)
-
-
-def _inverse_root(correlation: ComplexArray, size: FloatArray) -> ComplexArray:
-    """(H + 1, E, E) lower triangles that whiten noise of this correlation (H + 1, E, E) and size (H + 1, E)."""
-    unit = np.eye(size.shape[1], dtype=np.complex128)
-    triangle = np.linalg.cholesky(correlation + 1e-9 * unit)
-    inverse = np.linalg.solve(triangle, np.broadcast_to(unit, triangle.shape))
-    return np.asarray(inverse / size[:, None, :], dtype=np.complex128)
+        inverse = np.linalg.solve(triangle, np.broadcast_to(np.eye(count, dtype=np.complex128), triangle.shape))
+        return np.asarray(unbiased * inverse / size[:, None, :], dtype=np.complex128)
 
 
 def stacked(values: ComplexArray) -> FloatArray:
@@ -85,7 +65,7 @@ def stacked(values: ComplexArray) -> FloatArray:
     return np.concatenate([values[0].real, rest.real, rest.imag])
 
 
-def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = None, spread: float = 1.0) -> NoiseFloor:
+def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = None) -> NoiseFloor:
     """Covariance of the mean residual from successive differences of the periods.
 
     Differences, and not distances from the mean, so that a drift over the recording does not count as noise.
@@ -93,7 +73,6 @@ def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = No
     Args:
         residuals: (P, H + 1, E) residuals of every period from its own signals.
         leverage: (H + 1, E) share of the residuals that was projected out of them; none by default.
-        spread: share of the numbers within a window of harmonics that are independent after that [-].
 
     Returns:
         The noise floor.
@@ -104,7 +83,9 @@ def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = No
     products[1:] /= 2.0
     products[0] = products[0].real
     # variance of a mean of squared successive differences, as degrees of freedom
-    each, half = step_freedom(periods), _half_width(periods, harmonics, count)
+    each = step_freedom(periods)
+    half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * count / each - 1.0) / 2.0)))
+    half = min(half, max((harmonics - 1) // 2, 1))
     smooth = _moving_mean(products, half)
     left = 1.0
     if leverage is not None:
@@ -120,7 +101,7 @@ def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = No
     return NoiseFloor(
         covariance=smooth / periods,
         periods=periods,
-        freedom=each * (2 * half + 1) * spread,
+        freedom=each * (2 * half + 1) * left,
         total_freedom=each * 2.0 * harmonics * left,
     )
 
@@ -135,16 +116,14 @@ def noise_directions(periods: FloatArray) -> float:
 
     Friction that differs from pass to pass fills a few directions only. The number is the squared trace of the noise
     covariance over the trace of its square (Satterthwaite); the second follows from products of different steps
-    between periods, which share no noise (as in Chen and Qin, Annals of Statistics 38, 2010). There are few of them, so
-    the number is that at the lower end (one standard error) of what they leave open.
+    between periods, which share no noise (as in Chen and Qin, Annals of Statistics 38, 2010).
     """
     steps = np.diff(periods, axis=0) / np.sqrt(2.0)
     gram = steps @ steps.T
     apart = gram[np.triu_indices(len(steps), 2)]
     if len(apart) < FEWEST_STEPS:
         return float(periods.shape[1])
-    unsure = np.std(apart**2, ddof=1) / np.sqrt(len(apart))
-    return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2) + unsure), 1e-300))
+    return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2)), 1e-300))
 
 
 def unstacked(values: FloatArray, equations: int) -> ComplexArray:
@@ -155,7 +134,7 @@ def unstacked(values: FloatArray, equations: int) -> ComplexArray:
     return np.concatenate([first[None].astype(np.complex128), (real + 1j * imaginary).reshape(shape)])
 
 
-def noise_beside_model(residuals: ComplexArray, whitener: ComplexArray, basis: FloatArray) -> NoiseFloor:
+def noise_beside_model(residuals: ComplexArray, plain: NoiseFloor, basis: FloatArray) -> NoiseFloor:
     """Noise floor of what a fit leaves: the part of the scatter that it takes up is not in it.
 
     Friction that differs from pass to pass gathers around reversals. Samples left out and columns of friction take
@@ -163,53 +142,22 @@ def noise_beside_model(residuals: ComplexArray, whitener: ComplexArray, basis: F
 
     Args:
         residuals: (P, H + 1, E) residuals of every period.
-        whitener: (H + 1, E, E) by which the fit weighs them.
-        basis: (M, r) orthonormal basis of everything that is free, whitened.
+        plain: noise floor of the residuals as they are.
+        basis: (M, r) orthonormal basis of everything that is free, whitened by `plain`.
 
     Returns:
         The noise floor.
     """
-    count = residuals.shape[2]
-    colour = np.asarray(np.linalg.inv(whitener), dtype=np.complex128)
+    whitener, count = plain.whitener(), plain.equations
     flat = np.stack([stacked(np.matmul(whitener, r[:, :, None])[:, :, 0]) for r in residuals])
     flat = flat - (flat @ basis) @ basis.T
-    # back to torque before anything is averaged: scatter measured in its own floor would come out too small
-    left = np.stack([np.matmul(colour, unstacked(f, count)[:, :, None])[:, :, 0] for f in flat])
-    half = _half_width(len(residuals), len(colour), count)
-    return noise_from_periods(left, _leverage(basis, colour), _independent(basis, count, half))
-
-
-def _leverage(basis: FloatArray, colour: ComplexArray) -> FloatArray:
-    """(H + 1, E) share of the noise of every equation that a whitened basis (M, r) takes out, `colour` undoing it."""
-    own = unstacked(basis, colour.shape[1])
-    taken = np.einsum("ker,kfr->kef", own.real, own.real)
-    taken[1:] = (taken[1:] + np.einsum("ker,kfr->kef", own.imag, own.imag)[1:]) / 2.0
-    whole = np.sum(np.abs(colour) ** 2, axis=2)
-    share: FloatArray = np.real(np.einsum("kef,kfg,keg->ke", colour, taken, colour.conj())) / whole
-    return share
-
-
-def _half_width(periods: int, harmonics: int, equations: int) -> int:
-    """Harmonics to either side over which noise is smoothed, for covariances that can be inverted."""
-    half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * equations / step_freedom(periods) - 1.0) / 2.0)))
-    return min(half, max((harmonics - 1) // 2, 1))
-
-
-def _independent(basis: FloatArray, equations: int, half: int) -> float:
-    """Share of the numbers within a window of harmonics that stay independent once a basis (M, r) is projected out.
-
-    What is taken out may be the same in all of them (a sample is) or fill one: squared trace over the trace of the
-    square of what the projection leaves of a window, in one equation.
-    """
-    rows = unstacked(np.arange(len(basis), dtype=np.float64), equations)
-    shares = []
-    for start in range(1, max(len(rows) - 2 * half, 2), half):
-        window = rows[start : start + 2 * half + 1]
-        for e in range(equations):
-            own = basis[np.concatenate([window[:, e].real, window[:, e].imag]).astype(int)]
-            left = np.eye(len(own)) - own @ own.T
-            shares.append(float(np.trace(left)) ** 2 / max(float(np.sum(left**2)), 1e-300) / len(own))
-    return float(np.mean(shares))
+    share = unstacked(np.sum(basis**2, axis=1), count)
+    leverage = share.real.copy()
+    leverage[1:] = (share[1:].real + share[1:].imag) / 2.0
+    inside = noise_from_periods(np.stack([unstacked(f, count) for f in flat]), leverage)
+    colour = np.linalg.inv(whitener)
+    covariance = np.matmul(np.matmul(colour, inside.covariance), colour.conj().transpose(0, 2, 1))
+    return replace(inside, covariance=covariance)
 
 
 def _moving_mean(values: ComplexArray, half: int) -> ComplexArray:

@@ -81,7 +81,7 @@ def test_a_model_that_takes_up_scatter_does_not_lower_the_floor_of_the_rest():
     plain = noise_from_periods(residuals)
     size = len(stacked(residuals[0]))
     basis = np.linalg.qr(rng.standard_normal((size, size // 4)))[0]
-    beside = noise_beside_model(residuals, plain.whitener(), basis)
+    beside = noise_beside_model(residuals, plain, basis)
     assert np.mean(beside.std / plain.std) == pytest.approx(1.0, abs=0.05)
     assert beside.total_freedom == pytest.approx(0.75 * plain.total_freedom, rel=0.05)
 
@@ -96,7 +96,7 @@ def test_what_the_model_takes_up_altogether_is_not_in_its_floor():
     loud_floor = noise_from_periods(loud)
     whitener = loud_floor.whitener()
     flat = np.stack([stacked(np.matmul(whitener, unstacked(w, 3)[:, :, None])[:, :, 0]) for w in wild.T], axis=1)
-    beside = noise_beside_model(loud, whitener, np.linalg.qr(flat)[0])
+    beside = noise_beside_model(loud, loud_floor, np.linalg.qr(flat)[0])
     assert np.all(loud_floor.std > 10.0 * plain.std)
     np.testing.assert_allclose(beside.std, plain.std, rtol=0.15)
 
