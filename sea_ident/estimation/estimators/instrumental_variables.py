@@ -12,6 +12,7 @@ from sea_ident.estimation.estimators.weights import SampleWeights, sample_weight
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
+from sea_ident.processing.harmonics import within
 from sea_ident.processing.process import SMOOTHING
 
 Simulator = Callable[[Observations, FloatArray], Motion]
@@ -29,6 +30,11 @@ class InstrumentalVariables(Estimator):
     With a simulator, Z is the regressor of the simulated motion, with the parameters of the round before (IDIM-IV).
     Without one, the instruments of every period are the regressors of all the others: their noise is another one.
     Samples near reversal where friction varies from pass to pass count less or not at all, see `steady`.
+
+    Of periodic data only the harmonics that theta has count, in the torque as in the regressor. At every reversal
+    friction makes the motor jerk, and what its acceleration lacks beyond these harmonics is the same in every period:
+    no average takes it away, no spread between periods shows it, and it has the shape of friction. Within them the
+    acceleration lacks nothing.
 
     Attributes:
         simulator: gives the motion that the closed loop makes with given parameters.
@@ -55,6 +61,7 @@ class InstrumentalVariables(Estimator):
 
     def _simulated(self, observations: Observations, first: SampleWeights, simulator: Simulator) -> Estimate:
         rows, torque, weights, values = observations.rows, observations.torque, first.weights, first.solution.values
+        band = observations.processed.motor_harmonics
         count = rows.shape[-1]
         flat = rows.reshape(-1, count)
         moved = np.inf
@@ -65,19 +72,19 @@ class InstrumentalVariables(Estimator):
                     f"the simulated motion has {len(motion)} samples, the mean period has {len(rows)}; give it at the "
                     "times of the mean motion"
                 )
-            instruments = observations.rows_of(motion).total * weights[:, :, None]
+            instruments = within(within(observations.rows_of(motion).total, band) * weights[:, :, None], band)
             cross = _invertible(instruments.reshape(-1, count).T @ flat)
             before, values = values, np.linalg.solve(cross, np.einsum("knb,kn->b", instruments, torque))
             moved = float(np.max(np.abs(values - before) / np.maximum(np.abs(values), 1e-12)))
             if moved < 1e-4:
                 break
         note = f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round"
-        return _estimate(first, values, instruments, cross, note)
+        return _estimate(first, values, instruments, cross, band, note)
 
 
 def _other_periods(observations: Observations, first: SampleWeights) -> Estimate:
     processed, weights = observations.processed, first.weights
-    periods = processed.periods
+    periods, band = processed.periods, processed.motor_harmonics
     if periods < 2:
         raise IdentificationError(
             f"{processed.source}: instruments from other periods need at least two periods; give a simulator"
@@ -86,16 +93,18 @@ def _other_periods(observations: Observations, first: SampleWeights) -> Estimate
     whole = np.zeros_like(observations.rows)
     for rows in observations.each_period():
         whole += rows.total
+    whole = within(whole, band)
     cross, side = np.zeros((count, count)), np.zeros(count)
     for p, rows in enumerate(observations.each_period()):
-        instruments = (whole - rows.total) / (periods - 1.0) * weights[:, :, None]
-        cross += instruments.reshape(-1, count).T @ rows.total.reshape(-1, count)
-        side += np.einsum("knb,kn->b", instruments, processed.period_tau_motor[p])
+        own = within(rows.total, band)
+        instruments = (whole - own) / (periods - 1.0) * weights[:, :, None]
+        cross += instruments.reshape(-1, count).T @ own.reshape(-1, count)
+        side += np.einsum("knb,kn->b", instruments, within(processed.period_tau_motor[p], band))
     cross = _invertible(cross)
     values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
-    mean_instruments = whole / periods * weights[:, :, None]
+    mean_instruments = within(whole / periods * weights[:, :, None], band)
     note = "the instruments of every period are the regressors of the other periods"
-    return _estimate(first, values, mean_instruments, cross / periods, note)
+    return _estimate(first, values, mean_instruments, cross / periods, band, note)
 
 
 def _invertible(cross: FloatArray) -> FloatArray:
@@ -113,7 +122,7 @@ def _invertible(cross: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, note: str
+    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, band: int, note: str
 ) -> Estimate:
     """Values with their covariance by eq. 13, from instruments (N, n, b) and their products with the rows (b, b)."""
     inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
@@ -125,6 +134,7 @@ def _estimate(
         weights=first.weights,
         covariance=inverse @ meat @ inverse.T,
         log_det_weighted=first.solution.log_det,
+        harmonics=band,
         notes=(*first.notes, note),
         warnings=first.warnings,
     )
