@@ -12,12 +12,21 @@ from sea_ident.estimation.estimators.weights import SampleWeights, sample_weight
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
-from sea_ident.processing.harmonics import within
+from sea_ident.processing.harmonics import FEWEST_PERIODS, within
 from sea_ident.processing.process import SMOOTHING
 
 Simulator = Callable[[Observations, FloatArray], Motion]
 """From observations and base parameters (b,) to the motion, without noise, at the samples of the mean period."""
 
+
+LACKING = 2.0
+"""Energy of the mean residual beyond the harmonics of theta over that of its noise: above, acceleration is lacking."""
+
+LOSS = 1.1
+"""Standard deviation by eq. 13 within the harmonics of theta over that of all, up to which only those count."""
+
+GAIN = 0.5
+"""The same ratio from which on: less means that columns are told apart by rounding and noise, not that more is known."""
 
 LEAST_TOLD = 1e-13
 """Smallest singular value of the products of normalised columns that double precision tells from nothing."""
@@ -31,10 +40,11 @@ class InstrumentalVariables(Estimator):
     Without one, the instruments of every period are the regressors of all the others: their noise is another one.
     Samples near reversal where friction varies from pass to pass count less or not at all, see `steady`.
 
-    Of periodic data only the harmonics that theta has count, in the torque as in the regressor. At every reversal
-    friction makes the motor jerk, and what its acceleration lacks beyond these harmonics is the same in every period:
-    no average takes it away, no spread between periods shows it, and it has the shape of friction. Within them the
-    acceleration lacks nothing.
+    At every reversal friction makes the motor jerk. What its acceleration lacks beyond the harmonics that theta was
+    fitted by is the same in every period: no average takes it away, no spread between periods shows it, and it has the
+    shape of friction. So only the harmonics of theta count, in the torque as in the regressor: within them the
+    acceleration lacks nothing. Where the residual beyond them is noise, or they are so few that a standard deviation
+    would grow by a tenth, all count.
 
     Attributes:
         simulator: gives the motion that the closed loop makes with given parameters.
@@ -61,7 +71,7 @@ class InstrumentalVariables(Estimator):
 
     def _simulated(self, observations: Observations, first: SampleWeights, simulator: Simulator) -> Estimate:
         rows, torque, weights, values = observations.rows, observations.torque, first.weights, first.solution.values
-        band = observations.processed.motor_harmonics
+        band = _band(observations, first)
         count = rows.shape[-1]
         flat = rows.reshape(-1, count)
         moved = np.inf
@@ -84,7 +94,7 @@ class InstrumentalVariables(Estimator):
 
 def _other_periods(observations: Observations, first: SampleWeights) -> Estimate:
     processed, weights = observations.processed, first.weights
-    periods, band = processed.periods, processed.motor_harmonics
+    periods, band = processed.periods, _band(observations, first)
     if periods < 2:
         raise IdentificationError(
             f"{processed.source}: instruments from other periods need at least two periods; give a simulator"
@@ -105,6 +115,37 @@ def _other_periods(observations: Observations, first: SampleWeights) -> Estimate
     mean_instruments = within(whole / periods * weights[:, :, None], band)
     note = "the instruments of every period are the regressors of the other periods"
     return _estimate(first, values, mean_instruments, cross / periods, band, note)
+
+
+def _band(observations: Observations, first: SampleWeights) -> int:
+    """Harmonics of the equations that count; 0 where all do, as beyond those of theta nothing is lacking or much is told.
+
+    A motor that jerks has so many harmonics that little is lost. One that does not may have a few only; then most of
+    what tells friction lies beyond them, and its acceleration lacks nothing.
+    """
+    processed, harmonics = observations.processed, observations.processed.motor_harmonics
+    if processed.periods < FEWEST_PERIODS or not 0 < harmonics < processed.samples // 2:
+        return 0
+    values = first.solution.values
+    mean, residuals = observations.residual(values), observations.period_residuals(values)
+    residuals = residuals - residuals.mean(axis=0)
+    noise = sum(_energy(residual, harmonics) for residual in residuals) / (
+        processed.periods * (processed.periods - 1.0)
+    )
+    if not np.any(_energy(mean, harmonics) > LACKING * noise):
+        return 0
+    rows, count = observations.rows, observations.base.rank
+    instruments = within(within(rows, harmonics) * first.weights[:, :, None], harmonics)
+    inverse = np.linalg.inv(_invertible(instruments.reshape(-1, count).T @ rows.reshape(-1, count)))
+    moves = instruments @ inverse.T
+    variance = np.einsum("knb,kn,knb->b", moves, first.variance, moves)
+    ratio = variance / np.diag(first.solution.inverse)
+    return harmonics if np.all((ratio <= LOSS**2) & (ratio >= GAIN**2)) else 0
+
+
+def _energy(residual: FloatArray, harmonics: int) -> FloatArray:
+    """(n,) sum of squares of a residual (N, n) beyond these harmonics."""
+    return np.asarray(np.sum((residual - within(residual, harmonics)) ** 2, axis=0), dtype=np.float64)
 
 
 def _invertible(cross: FloatArray) -> FloatArray:
