@@ -26,7 +26,7 @@ LOSS = 1.1
 """Standard deviation by eq. 13 within the harmonics of theta over that of all, up to which only those count."""
 
 GAIN = 0.5
-"""The same ratio from which on: less means that columns are told apart by rounding and noise, not that more is known."""
+"""The same ratio from which on: below, columns are told apart by rounding and noise only."""
 
 LEAST_TOLD = 1e-13
 """Smallest singular value of the products of normalised columns that double precision tells from nothing."""
@@ -118,7 +118,7 @@ def _other_periods(observations: Observations, first: SampleWeights) -> Estimate
 
 
 def _band(observations: Observations, first: SampleWeights) -> int:
-    """Harmonics of the equations that count; 0 where all do, as beyond those of theta nothing is lacking or much is told.
+    """Harmonics of the equations that count; 0 where all do: nothing is lacking beyond, or much is told there.
 
     A motor that jerks has so many harmonics that little is lost. One that does not may have a few only; then most of
     what tells friction lies beyond them, and its acceleration lacks nothing.
