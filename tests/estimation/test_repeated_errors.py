@@ -43,8 +43,8 @@ def test_steps_that_repeat_are_told_and_counted(leg, truth):
         model = identify(leg, processed)
         assert any("encoder steps do not average out" in text for text in model.warnings)
         outside.extend(abs(s.stiffness - leg.spring(s.joint).stiffness) > s.half_width()[0] for s in model.springs)
-        # the noise of a repetition alone would be far more confident
-        assert np.median(model.std / np.sqrt(np.diag(model.uncertainty.repeatability))) > 1.1
+        # what a repetition does not show counts, too
+        assert np.all(model.std > np.sqrt(np.diag(model.uncertainty.repeatability)))
     # nine intervals of 95 %: three or more outside are chance in one case of a hundred
     assert sum(outside) <= 2
 

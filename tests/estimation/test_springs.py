@@ -4,8 +4,8 @@ import pytest
 from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, identify_measured_springs, identify_one_shot, identify_springs
-from sea_ident.estimation.spring_verdict import hysteresis_column
-from sea_ident.estimation.spring_verdict import verdict_of
+from sea_ident.estimation.spring_result import Verdict
+from sea_ident.estimation.spring_verdict import hysteresis_column, verdict_of
 from sea_ident.exceptions import IdentificationError, RecordingError, RobotError, SeaIdentWarning
 from sea_ident.processing import process
 from sea_ident.recordings import Recording
