@@ -19,6 +19,7 @@ from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVar
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations, base_rows
+from sea_ident.estimation.repeated_steps import repeated_steps
 from sea_ident.estimation.separability import unseparated_friction
 from sea_ident.estimation.solve import condition_number, solve_weighted
 from sea_ident.estimation.spring_result import Verdict
@@ -122,11 +123,17 @@ def identify(
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
     found.extend(_check_signs(observations))
-    model = _model(observations, estimate, uncertainty, how.name)
+    steps = repeated_steps(observations, how, estimate)
+    model = _model(observations, estimate, uncertainty if steps is None else steps.widened(uncertainty), how.name)
     if prior is not None:
         model = _refitted(updated(model, prior), observations)
     tell("identifying springs", 0.85)
-    springs = springs_from(observations, model.values, model.uncertainty, unknown_zero, in_springs)
+    if steps is None:
+        springs = springs_from(observations, model.values, model.uncertainty, unknown_zero, in_springs)
+    else:
+        found.append(steps.text)
+        springs = springs_from(observations, model.values, uncertainty, unknown_zero, in_springs)
+        springs = steps.widened_springs(springs, model.values, uncertainty, unknown_zero, in_springs)
     model = replace(model, springs=springs)
     found.extend(_doubts(model))
     return _reported(model, found, first, (*processed.notes, *estimate.notes))

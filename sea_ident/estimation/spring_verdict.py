@@ -80,4 +80,11 @@ def verdict_of(
         return Verdict.HYSTERETIC, f"held-out rms falls from {cubic:.3g} to {hysteresis:.3g} with a slipping element"
     if abs(law[1]) > limit * std[1] and cubic < linear:
         return Verdict.STIFFENING, f"held-out rms falls from {linear:.3g} to {cubic:.3g} with the cubic term"
-    return Verdict.LINEAR, f"held-out rms {linear:.3g} without and {cubic:.3g} with the cubic term"
+    held = f"held-out rms {linear:.3g} without and {cubic:.3g} with the cubic term"
+    if cubic < linear:
+        size = abs(law[1]) / std[1] if std[1] > 0.0 else np.inf
+        return (
+            Verdict.LINEAR,
+            f"{held}, but that term is {size:.2g} standard deviations from zero, not the {limit:.2g} that it takes",
+        )
+    return Verdict.LINEAR, held

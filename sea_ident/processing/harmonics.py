@@ -155,6 +155,24 @@ def _moving_sum(values: FloatArray, width: int) -> FloatArray:
     return np.asarray(total[width:] - total[:-width], dtype=np.float64)
 
 
+def within(values: FloatArray, harmonics: int) -> FloatArray:
+    """The part of periodic signals in their first harmonics, a projection.
+
+    Args:
+        values: (N, ...) one whole period.
+        harmonics: L; 0 stands for all.
+
+    Returns:
+        (N, ...) the signals without their harmonics beyond L.
+    """
+    samples = len(values)
+    if not 0 < harmonics < samples // 2:
+        return values
+    coefficients = np.fft.rfft(values, axis=0)
+    coefficients[harmonics + 1 :] = 0.0
+    return np.asarray(np.fft.irfft(coefficients, samples, axis=0), dtype=np.float64)
+
+
 def differentiate(values: FloatArray, period: float, harmonics: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fourier fit of one whole period and its analytic derivatives (paper, eqs. 15-17).
 

@@ -11,6 +11,7 @@ from sea_ident.arguments import expect, expect_number
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
+from sea_ident.processing.encoder_steps import encoder_steps
 from sea_ident.processing.plausible import beyond_limits, doubts, unused
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -292,6 +293,7 @@ def _periodic(
         places=tuple(keep),
         link_harmonics=int(links),
         motor_harmonics=int(motors),
+        encoder_steps=encoder_steps(signals.q, signals.theta, cuts["q"], cuts["theta"]),
         notes=tuple(notes),
         warnings=tuple(found),
     )

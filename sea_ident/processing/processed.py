@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from sea_ident._typing import FloatArray
 from sea_ident.motion import Motion
+from sea_ident.processing.encoder_steps import EncoderSteps
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,7 @@ class ProcessedRecording:
         places: (P,) number of every period in the recording, from 0: some may have been left out between others.
         link_harmonics: harmonics kept in q, 0 where the recording is not periodic.
         motor_harmonics: harmonics kept in theta, 0 where the recording is not periodic.
+        encoder_steps: steps of encoders that do not average out, None where all do.
         notes: what was done.
         warnings: what a user should know before trusting the result.
     """
@@ -46,6 +48,7 @@ class ProcessedRecording:
     places: tuple[int, ...]
     link_harmonics: int
     motor_harmonics: int
+    encoder_steps: EncoderSteps | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 

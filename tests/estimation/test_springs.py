@@ -4,7 +4,8 @@ import pytest
 from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, identify_measured_springs, identify_one_shot, identify_springs
-from sea_ident.estimation.spring_verdict import hysteresis_column
+from sea_ident.estimation.spring_result import Verdict
+from sea_ident.estimation.spring_verdict import hysteresis_column, verdict_of
 from sea_ident.exceptions import IdentificationError, RecordingError, RobotError, SeaIdentWarning
 from sea_ident.processing import process
 from sea_ident.recordings import Recording
@@ -159,3 +160,11 @@ def test_a_hysteresis_wider_than_every_deflection_cannot_be_told(leg, truth):
     effects = (*base_effects(leg), make_effect("spring_hysteresis", "hip", slip=1e3))
     with pytest.raises(IdentificationError, match=r"joint 'hip': this motion does not .*spring_hysteresis"):
         identify(leg, record(leg, truth, 4, **NOISE), effects=effects, period=10.0)
+
+
+def test_a_cubic_term_that_predicts_better_but_may_be_zero_is_refused_with_its_reason():
+    held_out = {"linear": 0.0367, "cubic": 0.0139, "hysteresis": 0.0139}
+    verdict, note = verdict_of(np.array([350.0, 260.0, 1.0]), np.array([1.0, 100.0, 0.1]), 11.0, held_out, 0.02, 5.0)
+    assert verdict is Verdict.LINEAR
+    assert "0.0367 without and 0.0139 with" in note
+    assert "2.6 standard deviations from zero, not the 4.4" in note

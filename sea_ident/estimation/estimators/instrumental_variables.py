@@ -12,11 +12,21 @@ from sea_ident.estimation.estimators.weights import SampleWeights, sample_weight
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
+from sea_ident.processing.harmonics import FEWEST_PERIODS, within
 from sea_ident.processing.process import SMOOTHING
 
 Simulator = Callable[[Observations, FloatArray], Motion]
 """From observations and base parameters (b,) to the motion, without noise, at the samples of the mean period."""
 
+
+LACKING = 2.0
+"""Energy of the mean residual beyond the harmonics of theta over that of its noise: above, acceleration is lacking."""
+
+LOSS = 1.1
+"""Standard deviation by eq. 13 within the harmonics of theta over that of all, up to which only those count."""
+
+GAIN = 0.5
+"""The same ratio from which on: below, columns are told apart by rounding and noise only."""
 
 LEAST_TOLD = 1e-13
 """Smallest singular value of the products of normalised columns that double precision tells from nothing."""
@@ -29,6 +39,12 @@ class InstrumentalVariables(Estimator):
     With a simulator, Z is the regressor of the simulated motion, with the parameters of the round before (IDIM-IV).
     Without one, the instruments of every period are the regressors of all the others: their noise is another one.
     Samples near reversal where friction varies from pass to pass count less or not at all, see `steady`.
+
+    At every reversal friction makes the motor jerk. What its acceleration lacks beyond the harmonics that theta was
+    fitted by is the same in every period: no average takes it away, no spread between periods shows it, and it has the
+    shape of friction. So only the harmonics of theta count, in the torque as in the regressor: within them the
+    acceleration lacks nothing. Where the residual beyond them is noise, or they are so few that a standard deviation
+    would grow by a tenth, all count.
 
     Attributes:
         simulator: gives the motion that the closed loop makes with given parameters.
@@ -55,6 +71,7 @@ class InstrumentalVariables(Estimator):
 
     def _simulated(self, observations: Observations, first: SampleWeights, simulator: Simulator) -> Estimate:
         rows, torque, weights, values = observations.rows, observations.torque, first.weights, first.solution.values
+        band = _band(observations, first)
         count = rows.shape[-1]
         flat = rows.reshape(-1, count)
         moved = np.inf
@@ -65,19 +82,19 @@ class InstrumentalVariables(Estimator):
                     f"the simulated motion has {len(motion)} samples, the mean period has {len(rows)}; give it at the "
                     "times of the mean motion"
                 )
-            instruments = observations.rows_of(motion).total * weights[:, :, None]
+            instruments = within(within(observations.rows_of(motion).total, band) * weights[:, :, None], band)
             cross = _invertible(instruments.reshape(-1, count).T @ flat)
             before, values = values, np.linalg.solve(cross, np.einsum("knb,kn->b", instruments, torque))
             moved = float(np.max(np.abs(values - before) / np.maximum(np.abs(values), 1e-12)))
             if moved < 1e-4:
                 break
         note = f"instruments simulated; the parameters moved by {moved:.1g} (relative) in the last round"
-        return _estimate(first, values, instruments, cross, note)
+        return _estimate(first, values, instruments, cross, band, note)
 
 
 def _other_periods(observations: Observations, first: SampleWeights) -> Estimate:
     processed, weights = observations.processed, first.weights
-    periods = processed.periods
+    periods, band = processed.periods, _band(observations, first)
     if periods < 2:
         raise IdentificationError(
             f"{processed.source}: instruments from other periods need at least two periods; give a simulator"
@@ -86,16 +103,49 @@ def _other_periods(observations: Observations, first: SampleWeights) -> Estimate
     whole = np.zeros_like(observations.rows)
     for rows in observations.each_period():
         whole += rows.total
+    whole = within(whole, band)
     cross, side = np.zeros((count, count)), np.zeros(count)
     for p, rows in enumerate(observations.each_period()):
-        instruments = (whole - rows.total) / (periods - 1.0) * weights[:, :, None]
-        cross += instruments.reshape(-1, count).T @ rows.total.reshape(-1, count)
-        side += np.einsum("knb,kn->b", instruments, processed.period_tau_motor[p])
+        own = within(rows.total, band)
+        instruments = (whole - own) / (periods - 1.0) * weights[:, :, None]
+        cross += instruments.reshape(-1, count).T @ own.reshape(-1, count)
+        side += np.einsum("knb,kn->b", instruments, within(processed.period_tau_motor[p], band))
     cross = _invertible(cross)
     values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
-    mean_instruments = whole / periods * weights[:, :, None]
+    mean_instruments = within(whole / periods * weights[:, :, None], band)
     note = "the instruments of every period are the regressors of the other periods"
-    return _estimate(first, values, mean_instruments, cross / periods, note)
+    return _estimate(first, values, mean_instruments, cross / periods, band, note)
+
+
+def _band(observations: Observations, first: SampleWeights) -> int:
+    """Harmonics of the equations that count; 0 where all do: nothing is lacking beyond, or much is told there.
+
+    A motor that jerks has so many harmonics that little is lost. One that does not may have a few only; then most of
+    what tells friction lies beyond them, and its acceleration lacks nothing.
+    """
+    processed, harmonics = observations.processed, observations.processed.motor_harmonics
+    if processed.periods < FEWEST_PERIODS or not 0 < harmonics < processed.samples // 2:
+        return 0
+    values = first.solution.values
+    mean, residuals = observations.residual(values), observations.period_residuals(values)
+    residuals = residuals - residuals.mean(axis=0)
+    noise = sum(_energy(residual, harmonics) for residual in residuals) / (
+        processed.periods * (processed.periods - 1.0)
+    )
+    if not np.any(_energy(mean, harmonics) > LACKING * noise):
+        return 0
+    rows, count = observations.rows, observations.base.rank
+    instruments = within(within(rows, harmonics) * first.weights[:, :, None], harmonics)
+    inverse = np.linalg.inv(_invertible(instruments.reshape(-1, count).T @ rows.reshape(-1, count)))
+    moves = instruments @ inverse.T
+    variance = np.einsum("knb,kn,knb->b", moves, first.variance, moves)
+    ratio = variance / np.diag(first.solution.inverse)
+    return harmonics if np.all((ratio <= LOSS**2) & (ratio >= GAIN**2)) else 0
+
+
+def _energy(residual: FloatArray, harmonics: int) -> FloatArray:
+    """(n,) sum of squares of a residual (N, n) beyond these harmonics."""
+    return np.asarray(np.sum((residual - within(residual, harmonics)) ** 2, axis=0), dtype=np.float64)
 
 
 def _invertible(cross: FloatArray) -> FloatArray:
@@ -113,7 +163,7 @@ def _invertible(cross: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, note: str
+    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, band: int, note: str
 ) -> Estimate:
     """Values with their covariance by eq. 13, from instruments (N, n, b) and their products with the rows (b, b)."""
     inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
@@ -125,6 +175,7 @@ def _estimate(
         weights=first.weights,
         covariance=inverse @ meat @ inverse.T,
         log_det_weighted=first.solution.log_det,
+        harmonics=band,
         notes=(*first.notes, note),
         warnings=first.warnings,
     )

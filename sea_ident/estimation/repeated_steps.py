@@ -1,0 +1,150 @@
+"""What steps of the encoders that repeat in every period do to an estimate."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.effects import JointEffect
+from sea_ident.estimation.estimators import Estimate, Estimator
+from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.spring_result import SpringResult, SpringTerm
+from sea_ident.estimation.springs import springs_from
+from sea_ident.estimation.uncertainty import Uncertainty
+from sea_ident.motion import Motion
+from sea_ident.processing import ProcessedRecording
+
+DRAWS = 8
+"""Other places of the steps for which everything is estimated again."""
+
+SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedSteps:
+    """The same estimation with errors of the encoders as their steps make them, drawn anew and added.
+
+    An error that is added once more changes the estimate about as much as the error that is in the data already did:
+    both the scatter of the changes and their mean, as the errors act by their squares.
+
+    Attributes:
+        again: (K,) the data with the errors added.
+        moves: (K, b) by how much the base parameters change.
+        text: what a user should know.
+    """
+
+    again: tuple[Observations, ...]
+    moves: FloatArray
+    text: str
+
+    def widened(self, uncertainty: Uncertainty) -> Uncertainty:
+        """The uncertainty of the base parameters with these changes in it; they are not seen in a repetition."""
+        more = self.moves.T @ self.moves / len(self.moves)
+        return replace(uncertainty, covariance=uncertainty.covariance + more)
+
+    def widened_springs(
+        self,
+        springs: tuple[SpringResult, ...],
+        values: FloatArray,
+        uncertainty: Uncertainty,
+        unknown_zero: Sequence[str],
+        effects: Sequence[JointEffect],
+    ) -> tuple[SpringResult, ...]:
+        """The springs with the changes of their laws in their covariances.
+
+        Args:
+            springs: m, found with the uncertainty of the base parameters before it was widened.
+            values: (b,) base parameters by which they were found.
+            uncertainty: of these, not widened.
+            unknown_zero: joints with unknown zeros.
+            effects: what else is in the springs.
+        """
+        if not springs:
+            return springs
+        runs = [
+            springs_from(observations, values + move, uncertainty, unknown_zero, effects)
+            for observations, move in zip(self.again, self.moves, strict=True)
+        ]
+        return tuple(
+            _widened(spring, np.array([_law(run[k]) for run in runs]) - _law(spring))
+            for k, spring in enumerate(springs)
+        )
+
+
+def repeated_steps(observations: Observations, how: Estimator, estimate: Estimate) -> RepeatedSteps | None:
+    """Estimate again with other errors of the encoders.
+
+    Args:
+        observations: the data.
+        how: the estimator.
+        estimate: what it found.
+
+    Returns:
+        What changes; None where all steps average out.
+
+    References:
+        Cook, Stefanski, Simulation-extrapolation estimation in parametric measurement error models, Journal of the
+        American Statistical Association, 1994.
+    """
+    steps, period = observations.processed.encoder_steps, observations.processed.period
+    if steps is None or period is None:
+        return None
+    rng = np.random.default_rng(SEED)
+    again = tuple(
+        replace(observations, processed=_with_error(observations.processed, period, rng)) for _ in range(DRAWS)
+    )
+    moves = np.stack([how.estimate(each).values - estimate.values for each in again])
+    text = (
+        f"{observations.processed.source}: encoder steps do not average out, as they repeat in every period: "
+        f"{steps.words(observations.robot.joint_names)}. Standard deviations count what such errors change. Finer "
+        "encoders, or motion that differs a little from period to period, make them smaller"
+    )
+    return RepeatedSteps(again, moves, text)
+
+
+def _with_error(processed: ProcessedRecording, period: float, rng: np.random.Generator) -> ProcessedRecording:
+    """The recording with one more error of the encoders, the same in every period."""
+    steps = processed.encoder_steps
+    if steps is None:
+        return processed
+    link, motor = steps.another(processed.motion, period, (processed.link_harmonics, processed.motor_harmonics), rng)
+    return replace(
+        processed,
+        motion=_moved(processed.motion, link, motor),
+        period_motions=tuple(_moved(motion, link, motor) for motion in processed.period_motions),
+    )
+
+
+def _moved(motion: Motion, link: tuple[FloatArray, ...], motor: tuple[FloatArray, ...]) -> Motion:
+    parts = (motion.q, motion.dq, motion.ddq, motion.theta, motion.dtheta, motion.ddtheta)
+    return Motion(motion.time, *(part + error for part, error in zip(parts, (*link, *motor), strict=True)))
+
+
+def _law(spring: SpringResult) -> FloatArray:
+    """(3 + k,) K1, K3, D and the values of all terms."""
+    more = [value for term in spring.terms for value in term.values]
+    return np.array([spring.stiffness, spring.cubic_stiffness, spring.damping, *more])
+
+
+def _widened(spring: SpringResult, moves: FloatArray) -> SpringResult:
+    """The spring with changes (K, 3 + k) of its law in its covariance."""
+    known = np.array(spring.full_covariance if spring.full_covariance else spring.covariance)
+    full = known + moves.T @ moves / len(moves)
+    std = np.sqrt(np.maximum(np.diag(full), 0.0))
+    terms: list[SpringTerm] = []
+    start = 3
+    for term in spring.terms:
+        stop = start + len(term.values)
+        terms.append(replace(term, stds=tuple(map(float, std[start:stop]))))
+        start = stop
+    table = tuple(tuple(float(v) for v in row) for row in full)
+    return replace(
+        spring,
+        stiffness_std=float(std[0]),
+        cubic_stiffness_std=float(std[1]),
+        damping_std=float(std[2]),
+        covariance=tuple(row[:3] for row in table[:3]),
+        terms=tuple(terms),
+        full_covariance=table if spring.full_covariance else (),
+    )
