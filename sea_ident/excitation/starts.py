@@ -7,7 +7,9 @@ Log det is concave in the information and smooth, other criteria have more optim
 done twice, and what was found by log det is one more start that is climbed to the end.
 """
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +36,8 @@ _DRAWS = 5
 _COARSE = 30.0
 # moves at the same time; the best of them is where the next ones begin
 _TOGETHER = 4
+# [s] for which a thread may compute before another one does
+_TURN = 5e-4
 # of joints that a move draws to random trajectories, and how far
 _MOVED = 1.0 / 3.0
 _SHARE = 0.5
@@ -121,7 +125,8 @@ class _Search:
             board.latest[self.count] = self.first
         interrupted = False
         try:
-            self._climb_all(board)
+            with _short_turns():
+                self._climb_all(board)
         except KeyboardInterrupt:
             board.stop.set()
             if not board.latest:
@@ -194,6 +199,17 @@ class _Search:
         if self.first is not None and problem.reported(self.first) > problem.reported(chosen):
             return self.first
         return chosen
+
+
+@contextmanager
+def _short_turns() -> Iterator[None]:
+    """Threads hand over to each other often: a step is made of products much shorter than a usual turn."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(min(usual, _TURN))
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(usual)
 
 
 def _scout(problem: Problem, board: Board, seed: int, given: FloatArray | None, start: int) -> float:

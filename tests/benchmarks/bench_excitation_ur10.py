@@ -27,7 +27,7 @@ from sea_ident.robot import Limits, Robot, load_robot
 # case: friction, criterion, starts, goal (log det at least, condition number below), seconds
 CASES = {
     "rigid, log det": (False, DOptimality(), 6, 395.0, 4.0),
-    "friction, log det": (True, DOptimality(), 10, 425.0, 3.0),
+    "friction, log det": (True, DOptimality(), 8, 425.0, 3.0),
     "rigid, condition number": (False, ConditionNumber(), 2, 15.0, 5.0),
     "friction, condition number": (True, ConditionNumber(), 3, 50.0, 5.0),
 }
