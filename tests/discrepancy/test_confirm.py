@@ -30,7 +30,7 @@ def both(laboratory):
     """A ripple everywhere, and friction that is larger at the knee just where it turns."""
     planted = [
         ("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0}),
-        ("stribeck_friction", "knee", [3.0], {"speed": 0.03}),
+        ("stribeck_friction", "knee", [1.5], {"speed": 0.03}),
     ]
     bench = laboratory.bench(laboratory.record(planted))
     return bench, selected(bench, [AT_REVERSALS, RIPPLE])

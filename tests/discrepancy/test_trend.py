@@ -147,7 +147,7 @@ def test_a_part_of_the_periods_has_a_profile_without_mean():
 
 def test_a_drift_within_a_period_is_no_effect_of_its_own(laboratory):
     """Stiffness that falls all the time is lower at the end of every period: that alone lies far beyond the noise."""
-    bench = laboratory.bench(laboratory.record([("stiffness_drift", "hip", [-200.0], {})], periods=12))
+    bench = laboratory.bench(laboratory.record([("stiffness_drift", "hip", [-150.0], {})], periods=12))
     now = settle(bench, bench.effects)
     trends = compare_periods(bench, now.fit, now.noise).trends
     assert [(t.effect.name, t.effect.joint) for t in trends] == [("stiffness_drift", "hip")]
@@ -159,7 +159,7 @@ def test_a_drift_within_a_period_is_no_effect_of_its_own(laboratory):
     # a saw on the spring torque of the hip, opposite in its two equations, nothing elsewhere
     deflection = bench.data.motion.deflection[:, 0]
     saw = (np.arange(len(deflection)) + 0.5) / len(deflection) - 0.5
-    np.testing.assert_allclose(known[:, 0], -200.0 * bench.data.period / 60.0 * saw * deflection, rtol=0.1, atol=2e-3)
+    np.testing.assert_allclose(known[:, 0], -150.0 * bench.data.period / 60.0 * saw * deflection, rtol=0.1, atol=2e-3)
     np.testing.assert_allclose(known[:, 1], -known[:, 0])
     np.testing.assert_array_equal(known[:, 2:], 0.0)
 
