@@ -6,7 +6,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.data import away_from_reversals
+from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.judge import significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, search, without
@@ -60,7 +60,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     Returns:
         What is left.
     """
-    away = Bench(away_from_reversals(bench.data), bench.effects)
+    away = Bench(replace(away_from_reversals(bench.data), alike=BARELY_SEEN), bench.effects)
     start = settle_again(away, selection.start.fit)
     final = settle_again(away, selection.final.fit) if selection.added else start
     weak = []

@@ -314,7 +314,7 @@ def away_from_reversals(data: PeriodData, caution: int = 2) -> PeriodData:
         samples=caution * REVERSAL_SAMPLES,
         uncertain=caution * UNCERTAIN_SIGN,
     )
-    return replace(data, left_out=data.left_out | wide, caution=caution, alike=BARELY_SEEN)
+    return replace(data, left_out=data.left_out | wide, caution=caution)
 
 
 def free_samples(left_out: NDArray[np.bool_], harmonics: int, alike: float = ALIKE) -> NDArray[np.complex128]:

@@ -5,7 +5,7 @@ import pytest
 
 from sea_ident.discrepancy.candidates import effect_key, scan
 from sea_ident.discrepancy.confirm import confirm
-from sea_ident.discrepancy.data import around_reversals, away_from_reversals
+from sea_ident.discrepancy.data import BARELY_SEEN, around_reversals, away_from_reversals
 from sea_ident.discrepancy.search import Selection, without
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
@@ -53,6 +53,7 @@ def test_what_is_seen_only_near_reversals_is_dropped(both):
     # the model there is the one with what is left
     assert [e.name for e in found.final.fit.effects[-1:]] == ["torque_ripple"]
     assert found.bench.data.caution == 2
+    assert found.bench.data.alike == BARELY_SEEN
 
 
 def test_what_holds_elsewhere_stays_with_its_size(rippled):
