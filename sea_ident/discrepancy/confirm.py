@@ -104,6 +104,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
     if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):
         return None
-    everywhere = settle_again(confirmed.bench, fit)
-    left = remainder_share(confirmed.bench, everywhere)
+    # with the usual samples freed: what a judge of the model would take out is just what must not be forgotten here
+    usual = Bench(away_from_reversals(bench.data), bench.effects)
+    left = remainder_share(usual, settle_again(usual, fit))
     return Confirmed(found, far, found.start, found.final, left)

@@ -18,9 +18,10 @@ from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.model import Excerpt, Fit, Model
-from sea_ident.estimation.observations import Observations, base_rows
+from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.repeated_steps import repeated_steps
 from sea_ident.estimation.separability import unseparated_friction
+from sea_ident.estimation.signs import check_signs
 from sea_ident.estimation.solve import condition_number, solve_weighted
 from sea_ident.estimation.spring_result import Verdict
 from sea_ident.estimation.springs import springs_from
@@ -122,7 +123,7 @@ def identify(
     tell("comparing the periods", 0.75)
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
-    found.extend(_check_signs(observations))
+    found.extend(check_signs(observations))
     steps = repeated_steps(observations, how, estimate)
     model = _model(observations, estimate, uncertainty if steps is None else steps.widened(uncertainty), how.name)
     if prior is not None:
@@ -132,8 +133,10 @@ def identify(
         springs = springs_from(observations, model.values, model.uncertainty, unknown_zero, in_springs)
     else:
         found.append(steps.text)
-        springs = springs_from(observations, model.values, uncertainty, unknown_zero, in_springs)
-        springs = steps.widened_springs(springs, model.values, uncertainty, unknown_zero, in_springs)
+        # what steps do to the springs by way of the base parameters is counted with what they do to them directly
+        known = uncertainty if prior is None else model.uncertainty
+        springs = springs_from(observations, model.values, known, unknown_zero, in_springs)
+        springs = steps.widened_springs(springs, model.values, known, unknown_zero, in_springs)
     model = replace(model, springs=springs)
     found.extend(_doubts(model))
     return _reported(model, found, first, (*processed.notes, *estimate.notes))
@@ -251,73 +254,6 @@ def _split_springs(effects: tuple[Effect, ...]) -> tuple[tuple[Effect, ...], tup
             )
         inside.append(effect)
     return tuple(effect for effect in effects if effect.side is not Side.SPRING), tuple(inside)
-
-
-def _check_signs(observations: Observations) -> list[str]:
-    """Warn of joints whose inertia comes out negative.
-
-    Raises:
-        IdentificationError: it does in every joint: the sign of the torque is wrong.
-    """
-    robot, source = observations.robot, observations.processed.source
-    inertia, std = joint_inertias(observations)
-    negative = inertia < -5.0 * std
-    names = [name for name, bad in zip(robot.joint_names, negative, strict=True) if bad]
-    if names and len(names) == robot.n:
-        raise IdentificationError(
-            f"{source}: the inertia comes out negative in every joint "
-            f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
-            f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on). Or are the columns of "
-            "joints interchanged?"
-        )
-    return [
-        f"{source}: the inertia that joint {name!r} moves comes out negative from its own torque: has that torque or "
-        f"current the wrong sign? Then exchange it ({_exchanged(name)}). Or is it that of another joint? The other "
-        "joints are wrong with it"
-        for name in names
-    ]
-
-
-def _exchanged(joint: str) -> str:
-    column = f"tau_motor_{joint}"
-    return (
-        f"ColumnSource({column!r}, sign=-1), on the command line --column '{column}={column},sign=-1'; likewise "
-        f"current_{joint} where there is no torque"
-    )
-
-
-def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
-    """Torque per acceleration of every joint, each found from the torque of that joint alone.
-
-    Link and motor move together, so this is the diagonal of H + S + S' + B at the mean position of the recording.
-
-    Returns:
-        (n,) inertias [kg m2] or [kg] and (n,) standard deviations.
-    """
-    robot = observations.robot
-    n = robot.n
-    middle = observations.processed.motion.q.mean(axis=0)
-    still = np.zeros((n + 1, n))
-    push = np.vstack([np.eye(n), np.zeros((1, n))])
-    motion = Motion.rigid(np.arange(n + 1.0), still + middle, still, push)
-    rows = base_rows(robot, observations.effects, observations.base, motion)
-    inertia, std = np.zeros(n), np.full(n, np.inf)
-    for i in range(n):
-        own = observations.rows[:, i]
-        norms = np.linalg.norm(own, axis=0)
-        seen = norms > 0.0
-        if not np.any(seen):
-            continue
-        scaled = own[:, seen] / norms[seen]
-        inverse = np.linalg.pinv(scaled, rcond=1e-6)
-        response = (rows[i, i] - rows[n, i])[seen] / norms[seen]
-        if np.linalg.norm(response - response @ inverse @ scaled) > 1e-3 * np.linalg.norm(response):
-            continue  # this joint's torque alone does not tell its inertia
-        values = inverse @ observations.torque[:, i]
-        spread = float(np.std(observations.torque[:, i] - scaled @ values))
-        inertia[i] = response @ values
-        std[i] = spread * float(np.linalg.norm(response @ inverse))
-    return inertia, std
 
 
 def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertainty, name: str) -> Model:

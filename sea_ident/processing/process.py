@@ -2,7 +2,6 @@
 
 import warnings as python_warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,27 +11,13 @@ from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
 from sea_ident.processing.encoder_steps import encoder_steps
-from sea_ident.processing.plausible import beyond_limits, doubts, unused
 from sea_ident.processing.processed import ProcessedRecording
+from sea_ident.processing.signals import Signals, read_signals
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 
 SMOOTHING = 0.5
 """Width [s] of the window over which the torque variance is smoothed."""
-
-OTHER_CHANNELS = ("current", "tau_spring", "temperature", "external_force", "q_reference", "theta_reference")
-
-
-@dataclass(frozen=True, eq=False)
-class _Signals:
-    """Columns of a recording in the order of the robot."""
-
-    q: FloatArray
-    theta: FloatArray
-    torque: torque.TorqueSource
-    others: dict[str, FloatArray]
-    warnings: list[str]
-    notes: list[str]
 
 
 def process(
@@ -71,7 +56,7 @@ def process(
     expect(recording, "process: recording", Recording)
     expect(robot, "process: robot", Robot)
     expect_number(period, "process: period", "s")
-    signals = _signals(recording, robot)
+    signals = read_signals(recording, robot)
     uniform = recording.is_uniform
     if period is None:
         period = _detected(recording, robot, signals, uniform)
@@ -98,7 +83,7 @@ def filter_recording(recording: Recording, robot: Robot, *, cutoff: float | None
     Raises:
         RecordingError: as `process`.
     """
-    result = _not_periodic(recording, robot, _signals(recording, robot), recording.is_uniform, cutoff)
+    result = _not_periodic(recording, robot, read_signals(recording, robot), recording.is_uniform, cutoff)
     for text in result.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
     return result
@@ -160,55 +145,7 @@ def _one_stretch(
     )
 
 
-def _signals(recording: Recording, robot: Robot) -> _Signals:
-    names = robot.joint_names
-    q = recording.channel("q", names)
-    theta = q.copy()
-    for i in robot.elastic_indices:
-        theta[:, i] = recording.channel("theta", [names[i]])[:, 0]
-    found: list[str] = []
-    notes: list[str] = []
-    still = [name for i, name in enumerate(names) if np.ptp(q[:, i]) == 0.0]
-    if len(still) == robot.n:
-        raise RecordingError(
-            f"{recording.source}: no joint moves: {', '.join(f'q_{name}' for name in still)} "
-            f"{'is' if len(still) == 1 else 'are'} constant; nothing can be identified at rest"
-        )
-    if still:
-        found.append(
-            f"{recording.source}: {', '.join(f'q_{name}' for name in still)} constant: what only the motion of "
-            "these joints shows cannot be told"
-        )
-    for i in robot.elastic_indices:
-        if np.array_equal(theta[:, i], q[:, i]):
-            found.append(
-                f"{recording.source}: theta_{names[i]} and q_{names[i]} are the same numbers: without a deflection "
-                "there is no spring to be identified"
-            )
-        elif np.ptp(theta[:, i]) == 0.0 < np.ptp(q[:, i]):
-            found.append(
-                f"{recording.source}: theta_{names[i]} constant while q_{names[i]} moves: is the motor measured? If it "
-                "is locked, this recording does not tell its inertia and friction"
-            )
-    source = torque.torque_source(recording, robot)
-    if np.all(np.ptp(source.values, axis=0) == 0.0):
-        raise RecordingError(
-            f"{recording.source}: the motor torques of all joints are constant ({', '.join(source.columns)}): nothing "
-            "was measured that a model could explain. Are the columns the right ones?"
-        )
-    found.extend(source.warnings)
-    found.extend(doubts(recording, robot, q, theta, source.values))
-    notes.extend(source.notes)
-    notes.extend([*beyond_limits(recording, robot, q), *unused(recording, robot)])
-    others = {
-        kind: recording.channel(kind, names) for kind in OTHER_CHANNELS if all(recording.has(kind, j) for j in names)
-    }
-    if robot.elastic_indices.size:
-        others["deflection"] = theta - q
-    return _Signals(q, theta, source, others, found, notes)
-
-
-def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bool) -> float | None:
+def _detected(recording: Recording, robot: Robot, signals: Signals, uniform: bool) -> float | None:
     """The period that the data show, with a note; the reference counts where there is one, as it has no noise."""
     kinds = ("q_reference", "theta_reference")
     reference = [
@@ -230,7 +167,7 @@ def _detected(recording: Recording, robot: Robot, signals: _Signals, uniform: bo
 def _periodic(
     recording: Recording,
     robot: Robot,
-    signals: _Signals,
+    signals: Signals,
     uniform: bool,
     period: float,
     link_harmonics: int | None,
@@ -368,7 +305,7 @@ def _motions(
 
 
 def _not_periodic(
-    recording: Recording, robot: Robot, signals: _Signals, uniform: bool, cutoff: float | None
+    recording: Recording, robot: Robot, signals: Signals, uniform: bool, cutoff: float | None
 ) -> ProcessedRecording:
     found, notes = list(signals.warnings), list(signals.notes)
     source, elastic = recording.source, robot.elastic_indices
