@@ -8,6 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.described import begin_as_described
 from sea_ident.discrepancy.edges import with_sharp_edges
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
@@ -246,8 +247,16 @@ def refitted(
     if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
         smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
         begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
-    fits = (bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun)
+    fits = [bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun]
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
+    described = begin_as_described(bench, before, effect, after) if isinstance(effect, SignalEffect) else None
+    if described is not None and described.better_than(bench, best):
+        model = (*before, described.effect, *after)
+        first = bench.fit(model, noise, start=described.parameters)
+        # the noise floor of a model that has bent its springs is as wrong as they are
+        own = bench.refine(model, bench.noise(first), start=described.parameters, only=len(bench.effects))
+        new = bench.refine(own.effects, noise, start=own.parameters, only=len(bench.effects))
+        best = min((best, new), key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     return with_sharp_edges(bench, best, noise, len(before))
 
 

@@ -1,0 +1,113 @@
+"""Errors in the chain of signals, begun with springs that are about what the robot's description says.
+
+A large error of an encoder is a large torque of a spring that is not there. A model without it bends its springs to
+do without that torque, until they have lost their stiffness or their sign, and from there no small step leads to the
+error. From springs that are known to a part of themselves the way is straight.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.linear import solve
+from sea_ident.effects import Effect, Side
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.regressor import prior_parameters
+
+DESCRIBED_WITHIN = 0.2
+"""Standard deviation of a spring from its description, as a share of it [-]: what tolerances and ageing make of it."""
+
+MOST_ROUNDS = 10
+"""Largest number of Gauss-Newton steps."""
+
+STANDS = 1e-3
+"""A step that takes less than this share of what is left was the last [-]."""
+
+CLEARLY = 0.7
+"""Share of what another model leaves, all equations counting alike, below which a beginning is worth a fit [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """Where a fit begins.
+
+    Attributes:
+        effect: the effect with its amounts.
+        parameters: of the model, by name.
+        left: (M,) residual, every equation in units of its own torque [-].
+    """
+
+    effect: SignalEffect
+    parameters: dict[str, float]
+    left: FloatArray
+
+    def better_than(self, bench: Bench, fit: Fit) -> bool:
+        """Whether clearly less is left than by a fit."""
+        other = bench.whitening(None).flat(fit.residual)
+        return float(np.linalg.norm(self.left)) < CLEARLY * float(np.linalg.norm(other))
+
+
+def begin_as_described(
+    bench: Bench, before: Sequence[Effect], effect: SignalEffect, after: Sequence[Effect]
+) -> Beginning | None:
+    """Amounts of an effect in the chain of signals, with springs that stay near their description as long as need be.
+
+    All equations count alike, and what is left sets how much the description counts beside them: at first, where the
+    amounts are wrong, all; in the end, where only noise is left, nothing.
+
+    Args:
+        bench: the recording.
+        before: effects of the model that stand before it.
+        effect: the effect; its amounts begin at zero.
+        after: effects of the model that stand after it.
+
+    Returns:
+        The beginning; None where the description gives no spring at the joint of the effect.
+    """
+    columns = bench.labels((*before, *after))
+    described = np.nan_to_num(prior_parameters(bench.robot, (*before, *after)))
+    spring = np.array([column.side is Side.SPRING for column in columns], dtype=bool)
+    held = np.flatnonzero(spring & (described != 0.0))
+    if not any(columns[k].joint == effect.joint for k in held):
+        return None
+    flat = bench.whitening(None).flat
+    ranges = np.array([amount.upper - amount.lower for amount in effect.amounts])
+    now = replace(effect, **{amount.name: 0.0 for amount in effect.amounts})  # type: ignore[arg-type]
+    design = flat(bench.design((*before, now, *after)))
+    values = described.copy()
+    known_part = {column.name: float(value) for column, value in zip(columns, values, strict=True)}
+    target = flat(bench.predicted((*before, now, *after), known_part).residual) + design @ described
+    values[~spring] = solve(design[:, ~spring], target - design[:, spring] @ described[spring])[0]
+    left = target - design @ values
+    size = float(np.sqrt(np.mean(left**2)))
+    for _ in range(MOST_ROUNDS):
+        model = (*before, now, *after)
+        parameters = {column.name: float(value) for column, value in zip(columns, values, strict=True)}
+        bent = [bench.signal_tangent(now, amount, model, parameters)[0] for amount in now.amounts]
+        whole = np.concatenate([design, flat(np.stack(bent, axis=2)) * ranges], axis=1)
+        weight = size / (DESCRIBED_WITHIN * np.abs(described[held]))
+        known = np.zeros((len(held), whole.shape[1]))
+        known[np.arange(len(held)), held] = weight
+        missing = weight * (described[held] - values[held])
+        step = solve(np.concatenate([whole, known]), np.concatenate([left, missing]))[0]
+        values = values + step[: len(values)]
+        now = _moved(now, step[len(values) :] * ranges)
+        design = flat(bench.design((*before, now, *after)))
+        left = target - design @ values
+        last, size = size, float(np.sqrt(np.mean(left**2)))
+        if abs(last - size) < STANDS * size:
+            break
+    return Beginning(now, {c.name: float(v) for c, v in zip(columns, values, strict=True)}, left)
+
+
+def _moved(effect: SignalEffect, steps: FloatArray) -> SignalEffect:
+    """The effect with its amounts changed, as far as their ranges allow."""
+    values = {
+        amount.name: float(np.clip(getattr(effect, amount.name) + step, amount.lower, amount.upper))
+        for amount, step in zip(effect.amounts, steps, strict=True)
+    }
+    return replace(effect, **values)  # type: ignore[arg-type]
