@@ -12,10 +12,11 @@ from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, of_every_kind, refitted
-from sea_ident.discrepancy.settle import Settled
+from sea_ident.discrepancy.search import FAMILY_LEVEL, LEAST_OF_A_SIGNAL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 
@@ -26,7 +27,14 @@ LOOKS_ALIKE = 0.9
 """Share of one effect in the span of another from which on they are called confusable."""
 
 RIVALS = 8
-"""Candidates that are tried in the place of an effect."""
+"""Candidates that are tried in the place of an effect, and the best of every kind beside them."""
+
+NEARLY_ALL = 0.02
+"""A rival that leaves less than this share of what an effect explains is weighed in the noise floor of its own [-]."""
+
+OF_WHAT_IS_LEFT = 0.2
+"""Share of what a model leaves beyond the noise below which a difference says nothing [-]: what makes the model wrong
+may speak for either."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
@@ -44,22 +52,26 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
         unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        equal = max(EQUALLY_GOOD * unit, OF_WHAT_IS_LEFT * fit.excess)
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
         tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)]
-        for candidate in of_every_kind(tried, RIVALS):
-            if candidate.gain < 0.3 * gain:
+        for candidate in of_every_kind(tried, RIVALS, own.joint):
+            if candidate.gain < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.3) * gain:
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if slowest(new.effects[position]):
                 continue
-            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
+            if equal <= new.statistic - fit.statistic < NEARLY_ALL * gain:
+                # the noise of the encoders enters by way of the model: by the floor of another it may be twice as large
+                new = settle_again(bench, new).fit
+            if new.statistic - fit.statistic < equal and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
                 other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-                if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit:
+                if new.statistic - fit.statistic + price < equal:
                     alike.append(other)
                     scores.append(new.statistic)
                 else:

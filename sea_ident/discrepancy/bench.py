@@ -83,12 +83,13 @@ class Bench(Tangents):
         """A model with given parameters, nothing fitted."""
         effects, columns = tuple(effects), self.labels(effects)
         values = np.array([parameters.get(column.name, 0.0) for column in columns])
-        residual = self._target - self.design(effects) @ values
+        design = self.design(effects)
+        residual = self._target - design @ values
         none = np.zeros((len(values), 0))
-        unit = np.ones(len(self.data.equations))
+        scale = self._link_scale(self.stiffness_slopes(columns, design, effects) @ values)
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
-        return Fit(effects, columns, values, residual, unit, flat, np.zeros((len(flat), 0)), nothing, none, ())
+        return Fit(effects, columns, values, residual, scale, flat, np.zeros((len(flat), 0)), nothing, none, ())
 
     def fit(
         self,
@@ -120,7 +121,7 @@ class Bench(Tangents):
         target = self._target if known is None else self._target - known
         parts = whitening.design(effects)
         whole = self._whole(whitening) if known is None else whitening.in_parts(target)
-        slopes = self.stiffness_slopes(columns, design)
+        slopes = self.stiffness_slopes(columns, design, effects)
         values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
             start = self.fit(effects, None, tangents=False).parameters
@@ -181,18 +182,18 @@ class Bench(Tangents):
     def slack_links(self, fit: Fit) -> list[int]:
         """Link equations of springs that have lost their stiffness in a fit: they explain nothing, at no price."""
         tight = self._scaled_links(self.stiffness_of(fit))
-        return [e for e in self._deflections if self.first_stiffness[e] > 0.0 and e not in tight]
+        return [e for e in self.links if self.first_stiffness[e] > 0.0 and e not in tight]
 
     def _scaled_links(self, stiffness: FloatArray) -> list[int]:
         """Link equations of which the scale follows the stiffness (E,)."""
         first = self.first_stiffness
-        return [e for e in self._deflections if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
+        return [e for e in self.links if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
 
     @cached_property
     def first_stiffness(self) -> FloatArray:
         """(E,) mean slope of the spring torque over the deflection in the first fit, 0 where there is no spring."""
         fit = self.first_fit
-        slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
+        slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects), fit.effects) @ fit.values
         for e, equation in enumerate(self.data.equations):
             if equation.kind is EquationKind.LINK:
                 known = self.robot.spring(equation.joint).stiffness or 0.0
@@ -238,7 +239,8 @@ class Bench(Tangents):
 
     def stiffness_of(self, fit: Fit) -> FloatArray:
         """(E,) slope of the springs of a fit over their deflection."""
-        slopes: FloatArray = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
+        design = self.design(fit.effects)
+        slopes: FloatArray = self.stiffness_slopes(fit.columns, design, fit.effects) @ fit.values
         return slopes
 
     @cached_property
