@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.bench import Bench, Known
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
@@ -17,7 +17,7 @@ from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, signifi
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.discrepancy.search import FAMILY_LEVEL, LEAST_OF_A_SIGNAL, Selection, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
 
 THE_SAME = 0.05
@@ -94,6 +94,19 @@ def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArr
     return total
 
 
+def _known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
+    """Some effects of a fit as they are, on the motion of a bench: those in a spring carry a part of its stiffness."""
+    stiffness = np.zeros(len(bench.data.equations))
+    for position in positions:
+        effect = fit.effects[position]
+        if effect.side is Side.SPRING and not isinstance(effect, SignalEffect):
+            motion = bench.state(fit.effects).motion
+            stiffness += bench.slopes_of(
+                contribution(bench, fit, [position])[:, :, None], bench.links_of(effect), motion
+            )[:, 0]
+    return Known(contribution(bench, fit, positions), stiffness)
+
+
 def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
     """(N, E) standard deviation of the torque of an effect over a period, from that of its parameters and shapes."""
     effect, count = fit.effects[position], len(fit.columns)
@@ -156,9 +169,9 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
         own_signal = [fit.effects[position]] if isinstance(fit.effects[position], SignalEffect) else []
         start = fit.parameters
-        known = contribution(bench, fit, others)
+        known = _known(bench, fit, others)
         without = bench.fit([*base, *signals], noise, start=start, tangents=False, known=known)
-        whole = contribution(bench, fit, added)
+        whole = _known(bench, fit, added)
         fixed = bench.fit([*base, *signals, *own_signal], noise, start=start, tangents=False, known=whole)
         free = (
             bench.refine([*base, *signals, fit.effects[position]], noise, start=start, only=len(base) + len(signals))

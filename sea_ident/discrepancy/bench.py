@@ -1,6 +1,7 @@
 """The working bench: models made of effects, fitted to one recording in its noise."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +47,19 @@ would carry it anywhere, and hold up the others."""
 
 RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is there beside a model that is fitted.
+
+    Attributes:
+        torque: (H + 1, E) [N m].
+        stiffness: (E,) what it adds to the slope of the spring torque of a link over its deflection.
+    """
+
+    torque: ComplexArray
+    stiffness: FloatArray
 
 
 class Bench(Tangents):
@@ -98,7 +112,7 @@ class Bench(Tangents):
         *,
         start: Mapping[str, float] | None = None,
         tangents: bool = True,
-        known: ComplexArray | None = None,
+        known: Known | None = None,
     ) -> Fit:
         """Fit the parameters of a model, its shapes held.
 
@@ -111,14 +125,15 @@ class Bench(Tangents):
             noise: noise floor; without one all equations count alike, and no scale can go wrong.
             start: parameters by name to start from; those of the unweighted fit by default.
             tangents: whether shapes are free in what is said about degrees of freedom and covariance.
-            known: (H + 1, E) torque that is there beside the model.
+            known: what is there beside the model.
 
         Returns:
             The fit.
         """
         effects = tuple(effects)
         columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
-        target = self._target if known is None else self._target - known
+        target = self._target if known is None else self._target - known.torque
+        beside = np.zeros(len(self.data.equations)) if known is None else known.stiffness
         parts = whitening.design(effects)
         whole = self._whole(whitening) if known is None else whitening.in_parts(target)
         slopes = self.stiffness_slopes(columns, design, effects)
@@ -131,19 +146,20 @@ class Bench(Tangents):
         if noise is None:
             values = values + solve(whitening.scaled(parts, scale), whitening.scaled(whole - parts @ values, scale))[0]
         else:
-            values = self._descend(parts, whole, whitening, slopes, values)
-            scale = self._link_scale(slopes @ values)
+            values = self._descend(parts, whole, whitening, slopes, beside, values)
+            scale = self._link_scale(slopes @ values + beside)
         left = whole - parts @ values
         whitened = whitening.scaled(left, scale)
         residual = target - design @ values
         if noise is None:
             directions, spectra = whitening.scaled(parts, scale), design
         else:
-            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
-            spectra = self.scaled(design, slopes, residual, scale, slopes @ values)
+            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
+            spectra = self.scaled(design, slopes, residual, scale, slopes @ values + beside)
         shapes = free_shapes(effects) if tangents else ()
         if shapes:
-            bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, slopes @ values)
+            tangent = self.tangents(effects, columns, values, shapes)
+            bent = self.scaled(*tangent, residual, scale, slopes @ values + beside)
             directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
             spectra = np.concatenate([spectra, bent], axis=2)
         _, basis, factor = solve(directions, whitened)
@@ -151,16 +167,23 @@ class Bench(Tangents):
         return Fit(effects, columns, values, residual, scale, whitened, basis, spectra, factor, shapes)
 
     def _descend(
-        self, parts: FloatArray, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray
+        self,
+        parts: FloatArray,
+        whole: FloatArray,
+        whitening: Whitening,
+        slopes: FloatArray,
+        beside: FloatArray,
+        values: FloatArray,
     ) -> FloatArray:
         """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness."""
         cost, best, step = np.inf, values, np.zeros(len(values))
         for _ in range(MOST_FIT_STEPS):
             left = whole - parts @ values
-            scale = self._link_scale(slopes @ values)
+            scale = self._link_scale(slopes @ values + beside)
             whitened = whitening.scaled(left, scale)
             new_cost = float(whitened @ whitened)
-            gone = len(self._scaled_links(slopes @ values)) < len(self._scaled_links(slopes @ best))
+            tight, before = (self._scaled_links(slopes @ each + beside) for each in (values, best))
+            gone = len(tight) < len(before)
             if gone or not new_cost <= cost * (1.0 + 1e-9):
                 step = 0.3 * step
                 values = best + step
@@ -169,7 +192,7 @@ class Bench(Tangents):
             cost, best = new_cost, values
             if converged:
                 break
-            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
+            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
             step = solve(flat, whitened)[0]
             values = values + step
         return best

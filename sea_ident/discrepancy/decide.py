@@ -9,11 +9,13 @@ from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import free_shapes, is_signal, moved
+from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut, tried
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Effect
+from sea_ident.effects.external_force import ExternalForce
 
 Alternatives = dict[int, tuple[Alternative, ...]]
 
@@ -96,23 +98,37 @@ def _with_another_shape(
     own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
     noise = bench.noise(fit)
     enough = EQUALLY_GOOD * max(fit.statistic / max(fit.dof, 1), 1.0)
-    shapes = [s for k, s in free_shapes(fit.effects) if k == position and s.logarithmic]
-    for shape in shapes if not is_signal(fit.effects[position]) else []:
-        for direction in (-1.0, 1.0):
-            for factor in OTHER_SHAPES:
-                effects = list(fit.effects)
-                effects[position] = moved(effects[position], shape, direction * float(np.log(factor)))
-                other = bench.fit(effects, noise, start=fit.parameters)
-                if other.statistic - fit.statistic > enough or not physical(bench, other, position):
-                    break
-                there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
-                result = there.transfers[position - len(effects) + selection.added]
-                if not _better(own, result):
-                    return other
-                if abs(result.statistic - found.statistic) < EQUALLY_GOOD * found.unit:
-                    # the other motion does not tell this shape either
-                    break
+    for ways in _other_shapes(bench, fit, position):
+        for effect in ways:
+            effects = list(fit.effects)
+            effects[position] = effect
+            other = bench.fit(effects, noise, start=fit.parameters)
+            if other.statistic - fit.statistic > enough or not physical(bench, other, position):
+                break
+            there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
+            result = there.transfers[position - len(effects) + selection.added]
+            if not _better(own, result):
+                return other
+            if result.statistic > found.statistic - EQUALLY_GOOD * found.unit:
+                # no better this way
+                break
+            found = result
     return None
+
+
+def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:
+    """An effect with other shapes: larger and larger ones, smaller and smaller ones, or each that a search tries."""
+    effect = fit.effects[position]
+    if is_signal(effect) or isinstance(effect, ExternalForce):
+        return []
+    if effect.name in SHAPES_THAT_STAY:
+        return [[other] for other in effect.variants(bench.state(fit.effects)) if other != effect]
+    return [
+        [moved(effect, shape, sign * float(np.log(factor))) for factor in OTHER_SHAPES]
+        for sign in (-1.0, 1.0)
+        for _, shape in free_shapes((effect,))
+        if shape.logarithmic
+    ]
 
 
 def _better(one: Transfer, other: Transfer) -> bool:

@@ -51,9 +51,9 @@ class AsymmetricSpring(SpringEffect):
         )
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
-        """Whether the spring pushes back on both sides of a kink."""
+        """Whether a spring of two straight sides pushes back on both."""
         stiffness = parameters.get(f"{self.joint}.spring_stiffness", 0.0)
-        return bool(self.kink == 0.0 or self.exponent > 1.0 or abs(values[0]) < abs(stiffness))
+        return bool(self.exponent > 1.0 or abs(values[0]) < abs(stiffness))
 
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """|theta - q - d|^p."""
