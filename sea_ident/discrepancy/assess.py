@@ -1,7 +1,7 @@
 """What else an effect could be, whether it holds on another motion, and what could not have been seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -41,7 +41,10 @@ POWER_QUANTILE = 1.645
 
 
 def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, ...]]:
-    """Effects that do as well in the place of each effect that was added, by its position in the model."""
+    """Effects that do as well in the place of each effect that was added, by its position in the model.
+
+    Those that do so by more parameters come last.
+    """
     now = selection.final
     fit, noise = now.fit, now.noise
     first = len(fit.effects) - selection.added
@@ -77,9 +80,11 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
                 else:
                     dearer.append((other, new.statistic))
         # what this motion shows as exactly the same as one of them is as likely, however many parameters it has
-        alike.extend(other for other, own_score in dearer if any(abs(own_score - s) < THE_SAME for s in scores))
-        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
-        found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
+        alike.extend(
+            replace(other, dearer=not any(abs(own_score - s) < THE_SAME for s in scores)) for other, own_score in dearer
+        )
+        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (not a.dearer, a.cos2))}
+        found[position] = tuple(sorted(unique.values(), key=lambda a: (a.dearer, -a.cos2)))
     return found
 
 
@@ -100,10 +105,8 @@ def _known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
     for position in positions:
         effect = fit.effects[position]
         if effect.side is Side.SPRING and not isinstance(effect, SignalEffect):
-            motion = bench.state(fit.effects).motion
-            stiffness += bench.slopes_of(
-                contribution(bench, fit, [position])[:, :, None], bench.links_of(effect), motion
-            )[:, 0]
+            own = contribution(bench, fit, [position])[:, :, None]
+            stiffness += bench.slopes_of(own, bench.links_of(effect), fit.effects)[:, 0]
     return Known(contribution(bench, fit, positions), stiffness)
 
 
@@ -134,6 +137,7 @@ class Transfer:
         share: of what it could explain there, what it does explain with its parameters as they are [-].
         tested: whether there was enough to explain to tell.
         statistic: weighted sum of squares that is left there with its parameters as they are.
+        excess: what of it is beyond the noise.
         unit: the same over its degrees of freedom with everything free, at least what noise leaves [-].
     """
 
@@ -141,6 +145,7 @@ class Transfer:
     tested: bool
     statistic: float = 0.0
     unit: float = 1.0
+    excess: float = 0.0
 
     @property
     def holds(self) -> bool:
@@ -183,7 +188,7 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         tested = significance(possible, columns, 10, without, noise) < FAMILY_LEVEL
         share = (without.statistic - fixed.statistic) / possible if possible > 0.0 else 0.0
         unit = now.fit.statistic / max(now.fit.dof, 1)
-        out.append(Transfer(float(share), bool(tested), fixed.statistic, max(unit, 1.0)))
+        out.append(Transfer(float(share), bool(tested), fixed.statistic, max(unit, 1.0), fixed.excess))
     return out
 
 

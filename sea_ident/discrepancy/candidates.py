@@ -130,7 +130,7 @@ def examine(
     whole = np.zeros((harmonics, len(fit.scale), count * width), dtype=np.complex128)
     whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
     if anchored.side is Side.SPRING and not isinstance(anchored, SignalEffect):
-        slopes = bench.slopes_of(whole, bench.links_of(anchored), bench.state(fit.effects).motion)
+        slopes = bench.slopes_of(whole, bench.links_of(anchored), fit.effects)
     if np.any(slopes):
         scaled = bench.scaled(whole, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))
     else:

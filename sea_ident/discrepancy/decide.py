@@ -23,6 +23,11 @@ OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 """Factors by which a shape is moved where it may be open."""
 
 
+def declared(alternatives: Mapping[int, tuple[Alternative, ...]]) -> Alternatives:
+    """The alternatives of each effect that are as likely where no other motion decides."""
+    return {position: tuple(a for a in others if not a.dearer) for position, others in alternatives.items()}
+
+
 def decide(
     bench: Bench, selection: Selection, alternatives: Mapping[int, tuple[Alternative, ...]], held: HeldOut
 ) -> tuple[Selection, Alternatives, HeldOut]:
@@ -49,6 +54,9 @@ def decide(
             if fit is None:
                 left.append(other)
                 continue
+            if other.dearer and own.excess < EQUALLY_GOOD * own.unit:
+                # nothing there that more parameters could explain
+                continue
             if changed:
                 # it was fitted beside an effect that is out by now
                 effects = list(selection.final.fit.effects)
@@ -66,6 +74,8 @@ def decide(
                 out = before.effects[position]
                 other, fit = Alternative(out.name, out.joint, other.cos2), before
                 own, rival = rival, own
+            elif other.dearer:
+                continue
             elif not _better(own, rival):
                 left.append(replace(other, fit=fit))
                 continue

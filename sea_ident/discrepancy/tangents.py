@@ -17,6 +17,9 @@ from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 
+SIGNALS_KEPT = 12
+"""Errors of the encoders of which the deflections are kept."""
+
 
 class Tangents(Columns):
     """Derivatives with respect to shapes and to amounts of effects in the chain of signals.
@@ -27,6 +30,7 @@ class Tangents(Columns):
 
     def __init__(self, data: PeriodData) -> None:
         super().__init__(data)
+        self._shown: dict[tuple[Effect, ...], dict[int, ComplexArray]] = {}
         self._derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
     def stiffness_slopes(
@@ -34,7 +38,7 @@ class Tangents(Columns):
     ) -> FloatArray:
         """(E, p) part of every parameter in the mean slope of the spring torque of a link over its deflection."""
         out = np.zeros((len(self.data.equations), len(columns)))
-        for e, deflection in self._deflections(self.state(effects).motion).items():
+        for e, deflection in self._deflections(signal_effects(effects)).items():
             joint = self.data.equations[e].joint
             own = [k for k, c in enumerate(columns) if c.joint == joint and c.side is Side.SPRING]
             if own:
@@ -46,17 +50,25 @@ class Tangents(Columns):
         """The link equations."""
         return tuple(e for e, equation in enumerate(self.data.equations) if equation.kind is EquationKind.LINK)
 
-    def _deflections(self, motion: Motion) -> dict[int, ComplexArray]:
-        """(H,) spectrum of the deflection in a motion, without its mean, for every link equation.
+    def _deflections(self, signals: tuple[Effect, ...]) -> dict[int, ComplexArray]:
+        """(H,) spectrum of the deflection, without its mean, for every link equation.
 
-        What an encoder shows late is no deflection: over that a spring would seem softer than it is.
+        As right encoders show it, for their noise is to be measured in it. What one shows late is no deflection: over
+        that a spring would seem softer than it is.
         """
-        deflection = spectrum(motion.deflection, self.data.harmonics)[1:]
-        return {e: deflection[:, self.data.equations[e].index] for e in self.links}
+        if signals not in self._shown:
+            if len(self._shown) > SIGNALS_KEPT:
+                self._shown.clear()
+            motion = self.data.motion
+            for signal in signals:
+                motion = signal.read(self.robot, motion)
+            deflection = spectrum(motion.deflection, self.data.harmonics)[1:]
+            self._shown[signals] = {e: deflection[:, self.data.equations[e].index] for e in self.links}
+        return self._shown[signals]
 
-    def slopes_of(self, change: ComplexArray, equations: Sequence[int], motion: Motion) -> FloatArray:
-        """(E, k) slope over the deflection in a motion of a torque (H + 1, E, k) of the springs of link equations."""
-        out, deflections = np.zeros(change.shape[1:]), self._deflections(motion)
+    def slopes_of(self, change: ComplexArray, equations: Sequence[int], effects: Sequence[Effect]) -> FloatArray:
+        """(E, k) slope over the deflection of a torque (H + 1, E, k) of the springs of some links within a model."""
+        out, deflections = np.zeros(change.shape[1:]), self._deflections(signal_effects(effects))
         for e in equations:
             out[e] = _slope(change[1:, e], deflections[e])
         return out
@@ -94,7 +106,7 @@ class Tangents(Columns):
             )
             out[:, :, k] = self._spectra(change, signal_effects(effects))
             if effect.side is Side.SPRING:
-                slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect), state.motion)[:, 0]
+                slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect), effects)[:, 0]
         return out, slopes
 
     def links_of(self, effect: Effect) -> list[int]:
@@ -116,7 +128,7 @@ class Tangents(Columns):
         here = float(getattr(effect, amount.name))
         # corrections do not commute: every one stays in its place
         chain = signals if effect in signals else (*signals, effect)
-        motions, rows, springs = [], [], []
+        motions, rows, springs, wholes = [], [], [], []
         # what stands at another joint does not see this signal
         rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
         for sign in (-1.0, 1.0):
@@ -124,6 +136,7 @@ class Tangents(Columns):
             whole = tuple(changed if signal == effect else signal for signal in chain)
             motion = corrected_motion(self.robot, whole, self.data.motion)
             motions.append(motion)
+            wholes.append(whole)
             state = State(self.robot, motion, self.data.channels)
             total, spring = (np.zeros((2, len(motion), self.robot.n)) for _ in range(2))
             for e in rest:
@@ -144,8 +157,8 @@ class Tangents(Columns):
             moved_rows = self._shift_tangent(effect, amount, effects, parameters, step)
         part = Contribution(part.link + moved_rows.link, part.motor + moved_rows.motor)
         low, high = (
-            self.slopes_of(self._spectra(Contribution(*spring[:, :, :, None]), ()), self.links_of(effect), motion)
-            for spring, motion in zip(springs, motions, strict=True)
+            self.slopes_of(self._spectra(Contribution(*spring[:, :, :, None]), ()), self.links_of(effect), whole)
+            for spring, whole in zip(springs, wholes, strict=True)
         )
         return self._spectra(part, signals)[:, :, 0], (high - low)[:, 0] / (2.0 * step)
 
