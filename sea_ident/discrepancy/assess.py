@@ -1,22 +1,23 @@
 """What else an effect could be, whether it holds on another motion, and what could not have been seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.bench import Bench, Known
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, of_every_kind, refitted
-from sea_ident.discrepancy.settle import Settled
-from sea_ident.effects import Effect
+from sea_ident.discrepancy.search import FAMILY_LEVEL, LEAST_OF_A_SIGNAL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
 
 THE_SAME = 0.05
@@ -26,14 +27,24 @@ LOOKS_ALIKE = 0.9
 """Share of one effect in the span of another from which on they are called confusable."""
 
 RIVALS = 8
-"""Candidates that are tried in the place of an effect."""
+"""Candidates that are tried in the place of an effect, and the best of every kind beside them."""
+
+NEARLY_ALL = 0.02
+"""A rival that leaves less than this share of what an effect explains is weighed in the noise floor of its own [-]."""
+
+OF_WHAT_IS_LEFT = 0.2
+"""Share of what a model leaves beyond the noise below which a difference says nothing [-]: what makes the model wrong
+may speak for either."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
 
 
 def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, ...]]:
-    """Effects that do as well in the place of each effect that was added, by its position in the model."""
+    """Effects that do as well in the place of each effect that was added, by its position in the model.
+
+    Those that do so by more parameters come last.
+    """
     now = selection.final
     fit, noise = now.fit, now.noise
     first = len(fit.effects) - selection.added
@@ -44,30 +55,36 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
         unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        equal = max(EQUALLY_GOOD * unit, OF_WHAT_IS_LEFT * fit.excess)
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
         tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)]
-        for candidate in of_every_kind(tried, RIVALS):
-            if candidate.gain < 0.3 * gain:
+        for candidate in of_every_kind(tried, RIVALS, own.joint):
+            if candidate.gain < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.3) * gain:
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if slowest(new.effects[position]):
                 continue
-            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
+            if equal <= new.statistic - fit.statistic < NEARLY_ALL * gain:
+                # the noise of the encoders enters by way of the model: by the floor of another it may be twice as large
+                new = settle_again(bench, new).fit
+            if new.statistic - fit.statistic < equal and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
                 other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-                if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit:
+                if new.statistic - fit.statistic + price < equal:
                     alike.append(other)
                     scores.append(new.statistic)
                 else:
                     dearer.append((other, new.statistic))
         # what this motion shows as exactly the same as one of them is as likely, however many parameters it has
-        alike.extend(other for other, own_score in dearer if any(abs(own_score - s) < THE_SAME for s in scores))
-        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: a.cos2)}
-        found[position] = tuple(sorted(unique.values(), key=lambda a: -a.cos2))
+        alike.extend(
+            replace(other, dearer=not any(abs(own_score - s) < THE_SAME for s in scores)) for other, own_score in dearer
+        )
+        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (not a.dearer, a.cos2))}
+        found[position] = tuple(sorted(unique.values(), key=lambda a: (a.dearer, -a.cos2)))
     return found
 
 
@@ -80,6 +97,17 @@ def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArr
         if len(own):
             total += bench.column_spectra(effect, fit.effects) @ own
     return total
+
+
+def _known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
+    """Some effects of a fit as they are, on the motion of a bench: those in a spring carry a part of its stiffness."""
+    stiffness = np.zeros(len(bench.data.equations))
+    for position in positions:
+        effect = fit.effects[position]
+        if effect.side is Side.SPRING and not isinstance(effect, SignalEffect):
+            own = contribution(bench, fit, [position])[:, :, None]
+            stiffness += bench.slopes_of(own, bench.links_of(effect), fit.effects)[:, 0]
+    return Known(contribution(bench, fit, positions), stiffness)
 
 
 def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
@@ -109,6 +137,7 @@ class Transfer:
         share: of what it could explain there, what it does explain with its parameters as they are [-].
         tested: whether there was enough to explain to tell.
         statistic: weighted sum of squares that is left there with its parameters as they are.
+        excess: what of it is beyond the noise.
         unit: the same over its degrees of freedom with everything free, at least what noise leaves [-].
     """
 
@@ -116,6 +145,7 @@ class Transfer:
     tested: bool
     statistic: float = 0.0
     unit: float = 1.0
+    excess: float = 0.0
 
     @property
     def holds(self) -> bool:
@@ -144,9 +174,9 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
         own_signal = [fit.effects[position]] if isinstance(fit.effects[position], SignalEffect) else []
         start = fit.parameters
-        known = contribution(bench, fit, others)
+        known = _known(bench, fit, others)
         without = bench.fit([*base, *signals], noise, start=start, tangents=False, known=known)
-        whole = contribution(bench, fit, added)
+        whole = _known(bench, fit, added)
         fixed = bench.fit([*base, *signals, *own_signal], noise, start=start, tangents=False, known=whole)
         free = (
             bench.refine([*base, *signals, fit.effects[position]], noise, start=start, only=len(base) + len(signals))
@@ -158,7 +188,7 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         tested = significance(possible, columns, 10, without, noise) < FAMILY_LEVEL
         share = (without.statistic - fixed.statistic) / possible if possible > 0.0 else 0.0
         unit = now.fit.statistic / max(now.fit.dof, 1)
-        out.append(Transfer(float(share), bool(tested), fixed.statistic, max(unit, 1.0)))
+        out.append(Transfer(float(share), bool(tested), fixed.statistic, max(unit, 1.0), fixed.excess))
     return out
 
 

@@ -1,6 +1,7 @@
 """The working bench: models made of effects, fitted to one recording in its noise."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -48,6 +49,19 @@ RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is there beside a model that is fitted.
+
+    Attributes:
+        torque: (H + 1, E) [N m].
+        stiffness: (E,) what it adds to the slope of the spring torque of a link over its deflection.
+    """
+
+    torque: ComplexArray
+    stiffness: FloatArray
+
+
 class Bench(Tangents):
     """Fits models to one recording.
 
@@ -83,12 +97,13 @@ class Bench(Tangents):
         """A model with given parameters, nothing fitted."""
         effects, columns = tuple(effects), self.labels(effects)
         values = np.array([parameters.get(column.name, 0.0) for column in columns])
-        residual = self._target - self.design(effects) @ values
+        design = self.design(effects)
+        residual = self._target - design @ values
         none = np.zeros((len(values), 0))
-        unit = np.ones(len(self.data.equations))
+        scale = self._link_scale(self.stiffness_slopes(columns, design, effects) @ values)
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
-        return Fit(effects, columns, values, residual, unit, flat, np.zeros((len(flat), 0)), nothing, none, ())
+        return Fit(effects, columns, values, residual, scale, flat, np.zeros((len(flat), 0)), nothing, none, ())
 
     def fit(
         self,
@@ -97,7 +112,7 @@ class Bench(Tangents):
         *,
         start: Mapping[str, float] | None = None,
         tangents: bool = True,
-        known: ComplexArray | None = None,
+        known: Known | None = None,
     ) -> Fit:
         """Fit the parameters of a model, its shapes held.
 
@@ -110,17 +125,18 @@ class Bench(Tangents):
             noise: noise floor; without one all equations count alike, and no scale can go wrong.
             start: parameters by name to start from; those of the unweighted fit by default.
             tangents: whether shapes are free in what is said about degrees of freedom and covariance.
-            known: (H + 1, E) torque that is there beside the model.
+            known: what is there beside the model.
 
         Returns:
             The fit.
         """
         effects = tuple(effects)
         columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
-        target = self._target if known is None else self._target - known
+        target = self._target if known is None else self._target - known.torque
+        beside = np.zeros(len(self.data.equations)) if known is None else known.stiffness
         parts = whitening.design(effects)
         whole = self._whole(whitening) if known is None else whitening.in_parts(target)
-        slopes = self.stiffness_slopes(columns, design)
+        slopes = self.stiffness_slopes(columns, design, effects)
         values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
             start = self.fit(effects, None, tangents=False).parameters
@@ -130,19 +146,20 @@ class Bench(Tangents):
         if noise is None:
             values = values + solve(whitening.scaled(parts, scale), whitening.scaled(whole - parts @ values, scale))[0]
         else:
-            values = self._descend(parts, whole, whitening, slopes, values)
-            scale = self._link_scale(slopes @ values)
+            values = self._descend(parts, whole, whitening, slopes, beside, values)
+            scale = self._link_scale(slopes @ values + beside)
         left = whole - parts @ values
         whitened = whitening.scaled(left, scale)
         residual = target - design @ values
         if noise is None:
             directions, spectra = whitening.scaled(parts, scale), design
         else:
-            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
-            spectra = self.scaled(design, slopes, residual, scale, slopes @ values)
+            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
+            spectra = self.scaled(design, slopes, residual, scale, slopes @ values + beside)
         shapes = free_shapes(effects) if tangents else ()
         if shapes:
-            bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, slopes @ values)
+            tangent = self.tangents(effects, columns, values, shapes)
+            bent = self.scaled(*tangent, residual, scale, slopes @ values + beside)
             directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
             spectra = np.concatenate([spectra, bent], axis=2)
         _, basis, factor = solve(directions, whitened)
@@ -150,16 +167,23 @@ class Bench(Tangents):
         return Fit(effects, columns, values, residual, scale, whitened, basis, spectra, factor, shapes)
 
     def _descend(
-        self, parts: FloatArray, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray
+        self,
+        parts: FloatArray,
+        whole: FloatArray,
+        whitening: Whitening,
+        slopes: FloatArray,
+        beside: FloatArray,
+        values: FloatArray,
     ) -> FloatArray:
         """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness."""
         cost, best, step = np.inf, values, np.zeros(len(values))
         for _ in range(MOST_FIT_STEPS):
             left = whole - parts @ values
-            scale = self._link_scale(slopes @ values)
+            scale = self._link_scale(slopes @ values + beside)
             whitened = whitening.scaled(left, scale)
             new_cost = float(whitened @ whitened)
-            gone = len(self._scaled_links(slopes @ values)) < len(self._scaled_links(slopes @ best))
+            tight, before = (self._scaled_links(slopes @ each + beside) for each in (values, best))
+            gone = len(tight) < len(before)
             if gone or not new_cost <= cost * (1.0 + 1e-9):
                 step = 0.3 * step
                 values = best + step
@@ -168,7 +192,7 @@ class Bench(Tangents):
             cost, best = new_cost, values
             if converged:
                 break
-            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
+            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
             step = solve(flat, whitened)[0]
             values = values + step
         return best
@@ -181,18 +205,18 @@ class Bench(Tangents):
     def slack_links(self, fit: Fit) -> list[int]:
         """Link equations of springs that have lost their stiffness in a fit: they explain nothing, at no price."""
         tight = self._scaled_links(self.stiffness_of(fit))
-        return [e for e in self._deflections if self.first_stiffness[e] > 0.0 and e not in tight]
+        return [e for e in self.links if self.first_stiffness[e] > 0.0 and e not in tight]
 
     def _scaled_links(self, stiffness: FloatArray) -> list[int]:
         """Link equations of which the scale follows the stiffness (E,)."""
         first = self.first_stiffness
-        return [e for e in self._deflections if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
+        return [e for e in self.links if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
 
     @cached_property
     def first_stiffness(self) -> FloatArray:
         """(E,) mean slope of the spring torque over the deflection in the first fit, 0 where there is no spring."""
         fit = self.first_fit
-        slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
+        slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects), fit.effects) @ fit.values
         for e, equation in enumerate(self.data.equations):
             if equation.kind is EquationKind.LINK:
                 known = self.robot.spring(equation.joint).stiffness or 0.0
@@ -238,7 +262,8 @@ class Bench(Tangents):
 
     def stiffness_of(self, fit: Fit) -> FloatArray:
         """(E,) slope of the springs of a fit over their deflection."""
-        slopes: FloatArray = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
+        design = self.design(fit.effects)
+        slopes: FloatArray = self.stiffness_slopes(fit.columns, design, fit.effects) @ fit.values
         return slopes
 
     @cached_property

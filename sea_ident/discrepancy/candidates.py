@@ -23,6 +23,9 @@ ONLY_AGAINST_REFERENCE = ("payload",)
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
 
+FEW_SHAPES = 24
+"""Shapes of one effect up to which those that single precision leaves in doubt are looked at one by one."""
+
 LARGEST_OF_MANY = 0.5
 """Torque of a shape, as a share of the torque of the motor, beyond which another shape is taken where there is one."""
 
@@ -127,7 +130,7 @@ def examine(
     whole = np.zeros((harmonics, len(fit.scale), count * width), dtype=np.complex128)
     whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
     if anchored.side is Side.SPRING and not isinstance(anchored, SignalEffect):
-        slopes = bench.slopes_of(whole, bench.links_of(anchored))
+        slopes = bench.slopes_of(whole, bench.links_of(anchored), fit.effects)
     if np.any(slopes):
         scaled = bench.scaled(whole, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))
     else:
@@ -152,7 +155,7 @@ def examine(
     values = values / np.where(norms > 0.0, norms, 1.0).reshape(count, width)
     gains = np.einsum("vk,vk->v", score * norms.reshape(count, width), values)
     allowed = np.array([_allowed(bench, fit, variant, value) for variant, value in zip(variants, values, strict=True)])
-    if count > 1:
+    if count > 1 and not _bounded(bench, anchored):
         # a wave that is much longer than the path bends like what is there already, and is as large as you like
         own = np.einsum("hevk,vk->hev", whole.reshape(harmonics, -1, count, width)[:, touched], values)
         sizes = np.sqrt(np.sum(np.abs(own) ** 2, axis=0)) / np.maximum(bench.torque_rms[touched, None], 1e-300)
@@ -160,7 +163,7 @@ def examine(
         if np.any(allowed & modest):
             gains = np.where(modest, gains, -1.0)
     # those that single precision leaves in doubt are looked at one by one, as are the best
-    doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= 10 else set()
+    doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= FEW_SHAPES else set()
     tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
     if width > 1:
         tries |= {int(v) for v in np.argsort(gains)[-2:]}
@@ -226,6 +229,12 @@ def _with_smoothing_of(exact: Effect, effect: Effect) -> Effect:
     if any(shape.name == "smoothing" for shape in effect.shapes) or not hasattr(exact, "smoothing"):
         return effect
     return replace(effect, smoothing=exact.smoothing)  # type: ignore[call-arg]
+
+
+def _bounded(bench: Bench, effect: Effect) -> bool:
+    """Whether physics bounds the size of an effect on both sides, however large it is beside the torque of a motor."""
+    own = type(effect).plausible is not Effect.plausible
+    return own and all(column.nonnegative for column in effect.columns(bench.robot))
 
 
 def _allowed(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) -> bool:

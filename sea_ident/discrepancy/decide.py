@@ -3,15 +3,29 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.findings import Alternative
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut, tried
-from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Effect
+from sea_ident.effects.external_force import ExternalForce
 
 Alternatives = dict[int, tuple[Alternative, ...]]
+
+OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
+"""Factors by which a shape is moved where it may be open."""
+
+
+def declared(alternatives: Mapping[int, tuple[Alternative, ...]]) -> Alternatives:
+    """The alternatives of each effect that are as likely where no other motion decides."""
+    return {position: tuple(a for a in others if not a.dearer) for position, others in alternatives.items()}
 
 
 def decide(
@@ -40,23 +54,91 @@ def decide(
             if fit is None:
                 left.append(other)
                 continue
+            if other.dearer and own.excess < EQUALLY_GOOD * own.unit:
+                # nothing there that more parameters could explain
+                continue
             if changed:
                 # it was fitted beside an effect that is out by now
                 effects = list(selection.final.fit.effects)
                 effects[position] = fit.effects[position]
                 fit = bench.fit(effects, noise, start=selection.final.fit.parameters)
-            replaced = replace(selection, final=Settled(fit, noise))
+            replaced = replace(selection, final=Settled(fit, bench.noise(fit)))
             there = tried(held.bench, replaced, held.source)
             rival = there.transfers[position - first]
             if _better(rival, own):
-                selection, own, changed = replaced, rival, True
+                before = selection.final.fit
+                selection, changed = replaced, True
                 held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
                 # what was no better than the one that is now out was no better than this one
                 left = []
+                out = before.effects[position]
+                other, fit = Alternative(out.name, out.joint, other.cos2), before
+                own, rival = rival, own
+            elif other.dearer:
+                continue
             elif not _better(own, rival):
                 left.append(replace(other, fit=fit))
+                continue
+            same = _with_another_shape(bench, selection, held, position, fit, rival)
+            if same is not None:
+                left.append(replace(other, fit=same))
         kept[position] = tuple(left)
     return selection, kept, held
+
+
+def _with_another_shape(
+    bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
+) -> Fit | None:
+    """A fit whose effect the other motion rules out, with a shape with which it does not.
+
+    A motion may leave a shape open: play that is never closed is the same torque whatever its width. Then only all the
+    shapes that it leaves open together can be ruled out.
+
+    Args:
+        bench: the recording that was used.
+        selection: what holds on the other motion.
+        held: the other motion, with what it is worth there.
+        position: of the effect in both models.
+        fit: the model with the effect that is ruled out as it was found, ...
+        found: ... and what it is worth on the other motion.
+
+    Returns:
+        The model with another shape; None where there is none that both motions allow.
+    """
+    own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
+    noise = bench.noise(fit)
+    enough = EQUALLY_GOOD * max(fit.statistic / max(fit.dof, 1), 1.0)
+    for ways in _other_shapes(bench, fit, position):
+        for effect in ways:
+            effects = list(fit.effects)
+            effects[position] = effect
+            other = bench.fit(effects, noise, start=fit.parameters)
+            if other.statistic - fit.statistic > enough or not physical(bench, other, position):
+                break
+            there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
+            result = there.transfers[position - len(effects) + selection.added]
+            if not _better(own, result):
+                return other
+            if result.statistic > found.statistic - EQUALLY_GOOD * found.unit:
+                # no better this way
+                break
+            found = result
+    return None
+
+
+def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:
+    """An effect with other shapes: larger and larger ones, smaller and smaller ones, or each that a search tries."""
+    effect = fit.effects[position]
+    if is_signal(effect) or isinstance(effect, ExternalForce):
+        return []
+    if effect.name in SHAPES_THAT_STAY:
+        return [[other] for other in effect.variants(bench.state(fit.effects)) if other != effect]
+    return [
+        [moved(effect, shape, sign * float(np.log(factor))) for factor in OTHER_SHAPES]
+        for sign in (-1.0, 1.0)
+        for _, shape in free_shapes((effect,))
+        if shape.logarithmic
+    ]
 
 
 def _better(one: Transfer, other: Transfer) -> bool:

@@ -14,7 +14,7 @@ from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.decide import Alternatives, decide
+from sea_ident.discrepancy.decide import Alternatives, decide, declared
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
@@ -195,7 +195,7 @@ def _tested(
     """
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
-        return confirmed, alternatives, held, notes
+        return confirmed, declared(alternatives), held, notes
     if any(alternatives.values()):
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed.less(selection)

@@ -92,12 +92,15 @@ class Alternative:
         joint: joint.
         cos2: share of the effect that it would explain as well [-].
         fit: the whole model with it in the place of the effect, where that was fitted; not written to files.
+        dearer: whether it does as well by more parameters only: then it is what is missing where another motion says
+            so, and no alternative where none does; not written to files.
     """
 
     effect: str
     joint: str | None
     cos2: float
     fit: Fit | None = field(default=None, compare=False, repr=False)
+    dearer: bool = field(default=False, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

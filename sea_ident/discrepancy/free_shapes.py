@@ -8,7 +8,11 @@ import numpy as np
 from sea_ident.effects import Effect, Shape
 from sea_ident.effects.signal import SignalEffect
 
-SHAPES_THAT_STAY = {"spring_stiffening": ("exponent",), "external_force": ("start", "stop")}
+SHAPES_THAT_STAY = {
+    "spring_stiffening": ("exponent",),
+    "asymmetric_spring": ("kink",),
+    "external_force": ("start", "stop"),
+}
 """Shape parameters that are not refined: they say which effect it is, or come from elsewhere."""
 
 

@@ -17,6 +17,9 @@ from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 
+SIGNALS_KEPT = 12
+"""Errors of the encoders of which the deflections are kept."""
+
 
 class Tangents(Columns):
     """Derivatives with respect to shapes and to amounts of effects in the chain of signals.
@@ -27,38 +30,47 @@ class Tangents(Columns):
 
     def __init__(self, data: PeriodData) -> None:
         super().__init__(data)
+        self._shown: dict[tuple[Effect, ...], dict[int, ComplexArray]] = {}
         self._derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
-    def stiffness_slopes(self, columns: Sequence[Column], design: ComplexArray) -> FloatArray:
+    def stiffness_slopes(
+        self, columns: Sequence[Column], design: ComplexArray, effects: Sequence[Effect]
+    ) -> FloatArray:
         """(E, p) part of every parameter in the mean slope of the spring torque of a link over its deflection."""
         out = np.zeros((len(self.data.equations), len(columns)))
-        for e, deflection in self._deflections.items():
+        for e, deflection in self._deflections(signal_effects(effects)).items():
             joint = self.data.equations[e].joint
             own = [k for k, c in enumerate(columns) if c.joint == joint and c.side is Side.SPRING]
-            power = float(np.sum(np.abs(deflection) ** 2))
-            if own and power > 0.0:
-                out[e, own] = -np.real(deflection.conj() @ design[1:, e, own]) / power
+            if own:
+                out[e, own] = _slope(design[1:, e, own], deflection)
         return out
 
     @cached_property
-    def _deflections(self) -> dict[int, ComplexArray]:
-        """(H,) spectrum of the deflection, without its mean, for every link equation."""
-        deflection = spectrum(self.data.motion.deflection, self.data.harmonics)[1:]
-        return {
-            e: deflection[:, equation.index]
-            for e, equation in enumerate(self.data.equations)
-            if equation.kind is EquationKind.LINK
-        }
+    def links(self) -> tuple[int, ...]:
+        """The link equations."""
+        return tuple(e for e, equation in enumerate(self.data.equations) if equation.kind is EquationKind.LINK)
 
-    def slopes_of(self, change: ComplexArray, equations: Sequence[int]) -> FloatArray:
-        """(E, k) slope over the deflection of a torque (H + 1, E, k) of the springs of some link equations."""
-        out = np.zeros(change.shape[1:])
+    def _deflections(self, signals: tuple[Effect, ...]) -> dict[int, ComplexArray]:
+        """(H,) spectrum of the deflection, without its mean, for every link equation.
+
+        As right encoders show it, for their noise is to be measured in it. What one shows late is no deflection: over
+        that a spring would seem softer than it is.
+        """
+        if signals not in self._shown:
+            if len(self._shown) > SIGNALS_KEPT:
+                self._shown.clear()
+            motion = self.data.motion
+            for signal in signals:
+                motion = signal.read(self.robot, motion)
+            deflection = spectrum(motion.deflection, self.data.harmonics)[1:]
+            self._shown[signals] = {e: deflection[:, self.data.equations[e].index] for e in self.links}
+        return self._shown[signals]
+
+    def slopes_of(self, change: ComplexArray, equations: Sequence[int], effects: Sequence[Effect]) -> FloatArray:
+        """(E, k) slope over the deflection of a torque (H + 1, E, k) of the springs of some links within a model."""
+        out, deflections = np.zeros(change.shape[1:]), self._deflections(signal_effects(effects))
         for e in equations:
-            if e in self._deflections:
-                deflection = self._deflections[e]
-                power = float(np.sum(np.abs(deflection) ** 2))
-                if power > 0.0:
-                    out[e] = -np.real(deflection.conj() @ change[1:, e]) / power
+            out[e] = _slope(change[1:, e], deflections[e])
         return out
 
     def tangents(
@@ -94,12 +106,12 @@ class Tangents(Columns):
             )
             out[:, :, k] = self._spectra(change, signal_effects(effects))
             if effect.side is Side.SPRING:
-                slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect))[:, 0]
+                slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect), effects)[:, 0]
         return out, slopes
 
     def links_of(self, effect: Effect) -> list[int]:
         """Link equations of the joint of an effect."""
-        return [e for e in self._deflections if self.data.equations[e].joint == effect.joint]
+        return [e for e in self.links if self.data.equations[e].joint == effect.joint]
 
     def signal_tangent(
         self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float]
@@ -116,7 +128,7 @@ class Tangents(Columns):
         here = float(getattr(effect, amount.name))
         # corrections do not commute: every one stays in its place
         chain = signals if effect in signals else (*signals, effect)
-        motions, rows, springs = [], [], []
+        motions, rows, springs, wholes = [], [], [], []
         # what stands at another joint does not see this signal
         rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
         for sign in (-1.0, 1.0):
@@ -124,6 +136,7 @@ class Tangents(Columns):
             whole = tuple(changed if signal == effect else signal for signal in chain)
             motion = corrected_motion(self.robot, whole, self.data.motion)
             motions.append(motion)
+            wholes.append(whole)
             state = State(self.robot, motion, self.data.channels)
             total, spring = (np.zeros((2, len(motion), self.robot.n)) for _ in range(2))
             for e in rest:
@@ -143,9 +156,11 @@ class Tangents(Columns):
         if type(effect).shifted is not Effect.shifted:
             moved_rows = self._shift_tangent(effect, amount, effects, parameters, step)
         part = Contribution(part.link + moved_rows.link, part.motor + moved_rows.motor)
-        stiffer = (springs[1] - springs[0])[:, :, :, None] / (2.0 * step)
-        slopes = self.slopes_of(self._spectra(Contribution(stiffer[0], stiffer[1]), ()), self.links_of(effect))
-        return self._spectra(part, signals)[:, :, 0], slopes[:, 0]
+        low, high = (
+            self.slopes_of(self._spectra(Contribution(*spring[:, :, :, None]), ()), self.links_of(effect), whole)
+            for spring, whole in zip(springs, wholes, strict=True)
+        )
+        return self._spectra(part, signals)[:, :, 0], (high - low)[:, 0] / (2.0 * step)
 
     def _shift_tangent(
         self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float], step: float
@@ -222,3 +237,11 @@ class Tangents(Columns):
         change = out[0] - out[1]
         self._derivatives = (key, (change[0], change[1], change[2]))
         return self._derivatives[1]
+
+
+def _slope(torque: ComplexArray, deflection: ComplexArray) -> FloatArray:
+    """(k,) slope of the spring torque that springs leave in a link equation (H, k) over the deflection (H,)."""
+    power = float(np.sum(np.abs(deflection) ** 2))
+    if power == 0.0:
+        return np.zeros(torque.shape[1])
+    return np.asarray(-np.real(deflection.conj() @ torque) / power, dtype=np.float64)

@@ -1,30 +1,39 @@
 """A spring that is stiffer one way than the other."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape
+from sea_ident.effects.base import Column, Shape, State
 from sea_ident.effects.spring import SpringEffect
 from sea_ident.robot import Robot
+
+KINKS = (-0.3, -0.15, 0.15, 0.3)
+"""Places of a kink that a search tries beside none, as shares of the largest deflection of the motion [-]."""
 
 
 @dataclass(frozen=True)
 class AsymmetricSpring(SpringEffect):
-    """K |theta - q|^p.
+    """K |theta - q - d|^p.
 
     Attributes:
         joint: joint at which it acts.
         exponent: p [-].
+        kink: d, deflection at which one side ends and the other begins [rad] or [m].
     """
 
     exponent: float = 1.0
+    kink: float = 0.0
 
     name: ClassVar[str] = "asymmetric_spring"
     source: ClassVar[str] = "Vanderborght et al., MACCEPA 2.0, ICRA 2009"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "-", 1.0, 3.0, logarithmic=False, points=3),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("exponent", "-", 1.0, 3.0, logarithmic=False, points=3),
+        Shape("kink", "rad", -0.2, 0.2, logarithmic=False),
+    )
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
@@ -32,6 +41,20 @@ class AsymmetricSpring(SpringEffect):
         unit = f"{torque}/{position}^{self.exponent:.3g}"
         return (Column(self.parameter_name(), unit, self.name, self.joint, self.side),)
 
+    def variants(self, state: State) -> tuple["AsymmetricSpring", ...]:
+        """Exponents with the kink where the spring is at rest, and kinks elsewhere between two straight sides."""
+        largest = float(np.abs(state.motion.deflection[:, state.robot.index(self.required_joint)]).max())
+        exponents = (float(exponent) for exponent in self.shapes[0].grid())
+        return (
+            *(replace(self, exponent=exponent, kink=0.0) for exponent in exponents),
+            *(replace(self, exponent=1.0, kink=share * largest) for share in KINKS),
+        )
+
+    def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
+        """Whether a spring of two straight sides pushes back on both."""
+        stiffness = parameters.get(f"{self.joint}.spring_stiffness", 0.0)
+        return bool(self.exponent > 1.0 or abs(values[0]) < abs(stiffness))
+
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """|theta - q|^p."""
-        return (np.abs(theta - q) ** self.exponent)[:, None]
+        """|theta - q - d|^p."""
+        return (np.abs(theta - q - self.kink) ** self.exponent)[:, None]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +11,10 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column, Shape, State
 from sea_ident.effects.spring import SpringEffect, deflections
 from sea_ident.robot import Robot
+
+LARGEST_STEP = 2.0
+"""Factor between two widths that a search tries: where the play is never closed, K follows from the width, and what is
+between the spring's own stiffness and its double must not be stepped over."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +40,14 @@ class Backlash(SpringEffect):
         return (Column(self.parameter_name(), f"{torque}/{position}", self.name, self.joint, self.side, True),)
 
     def variants(self, state: State) -> tuple["Backlash", ...]:
-        """Widths within the deflections of this motion."""
-        return tuple(replace(self, half_width=width) for width in deflections(state, self.required_joint, 18))
+        """Widths within the deflections of this motion, and between where it deflects to one side only."""
+        widths = deflections(state, self.required_joint, 18)
+        between = [
+            float(width)
+            for low, high in pairwise(widths)
+            for width in np.geomspace(low, high, int(np.ceil(np.log(high / low) / np.log(LARGEST_STEP))) + 1)[1:-1]
+        ]
+        return tuple(replace(self, half_width=width) for width in sorted((*widths, *between)))
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
         """Whether K is about the stiffness of the spring that the play is in series with."""

@@ -267,6 +267,10 @@ class Effect(ABC):
         """The motion as it was, from the motion as the sensors show it; by default they are the same."""
         return motion
 
+    def read(self, robot: Robot, motion: Motion) -> Motion:
+        """The motion as right encoders in their places would show it; by default that is the motion of the bodies."""
+        return self.corrected(robot, motion)
+
     def shifted(self, robot: Robot, time: FloatArray, rows: Contribution) -> Contribution:
         """Rows as the recorded torque shows them; by default they are the same."""
         return rows

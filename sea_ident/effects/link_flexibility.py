@@ -95,6 +95,10 @@ class LinkFlexibility(SignalEffect):
             motion.ddtheta[:, i] - whole_bend,
         )
 
+    def read(self, robot: Robot, motion: Motion) -> Motion:
+        """As it is: what bends behind an encoder is no error of it."""
+        return motion
+
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Q where the encoder sits, between the two compliances.
 

@@ -3,7 +3,7 @@
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -168,39 +168,48 @@ def _removed(cases: list[Score], by_row: dict[str, list[Score]], add: Callable[[
     add(_share("removed", "the same, outside the alias cluster", "<= 5 %", map(outside, cases), lambda x: x <= 0.05))
 
 
-DECLARED_ALIASES = {
-    "stribeck_friction": {"nonlinear_viscous_friction"},
-    "nonlinear_viscous_friction": {"stribeck_friction"},
-    "presliding_friction": {"torque_delay"},
-    "load_dependent_friction": {"directional_efficiency", "position_dependent_friction", "torque_saturation"},
-    "directional_efficiency": {"load_dependent_friction"},
-    "position_dependent_friction": {"load_dependent_friction"},
-    "torque_ripple": {"torque_offset"},
-    "torque_offset": {"spring_offset", "encoder_offset"},
-    "torque_saturation": {"load_dependent_friction"},
-    "torque_constant": set(),
-    "spring_stiffening": {"asymmetric_spring", "backlash"},
-    "asymmetric_spring": {"backlash", "spring_offset", "spring_stiffening"},
-    "spring_hysteresis": {"backlash"},
-    "backlash": {"spring_offset", "asymmetric_spring", "spring_stiffening"},
-    "spring_offset": {"encoder_offset"},
-    "encoder_offset": {"spring_offset", "base_tilt"},
-    "encoder_eccentricity": {"parallel_spring", "base_tilt"},
-    "parallel_spring": {"encoder_eccentricity"},
-    "base_tilt": {"encoder_offset", "spring_offset"},
-    "position_delay": {"torque_delay"},
-    "torque_delay": {"presliding_friction"},
-    "friction_drift": {"torque_constant_drift", "stiffness_drift", "temperature_friction"},
-    "torque_constant_drift": {"friction_drift", "stiffness_drift", "temperature_friction"},
-    "stiffness_drift": {"friction_drift", "torque_constant_drift", "temperature_friction"},
-    "temperature_friction": {"friction_drift"},
+EASILY_TAKEN_FOR = {
+    "stribeck_friction": ("nonlinear_viscous_friction",),
+    "nonlinear_viscous_friction": ("stribeck_friction",),
+    "presliding_friction": ("torque_delay",),
+    "load_dependent_friction": ("directional_efficiency", "position_dependent_friction"),
+    "directional_efficiency": ("load_dependent_friction",),
+    "position_dependent_friction": ("load_dependent_friction",),
+    "torque_ripple": ("torque_offset",),
+    "torque_offset": ("spring_offset", "encoder_offset"),
+    "torque_saturation": ("load_dependent_friction",),
+    "torque_constant": (),
+    "spring_stiffening": ("asymmetric_spring", "backlash"),
+    "asymmetric_spring": ("backlash", "spring_offset"),
+    "spring_hysteresis": ("backlash",),
+    "backlash": ("spring_offset",),
+    "spring_offset": ("encoder_offset",),
+    "encoder_offset": ("spring_offset",),
+    "encoder_eccentricity": ("parallel_spring", "base_tilt"),
+    "base_tilt": ("encoder_offset", "spring_offset"),
+    "position_delay": ("torque_delay",),
+    "torque_delay": ("presliding_friction",),
+    "friction_drift": ("torque_constant_drift", "stiffness_drift"),
+    "torque_constant_drift": ("friction_drift", "stiffness_drift"),
+    "stiffness_drift": ("friction_drift", "torque_constant_drift"),
+    "temperature_friction": ("friction_drift",),
 }
-"""What an effect can be taken for by its nature, from the description of the effects; stated before any run."""
+"""The column `easily taken for` in the description of the effects; stated before any run."""
+
+
+def either_way(taken_for: Mapping[str, Iterable[str]]) -> dict[str, set[str]]:
+    """What each effect can be taken for where one that is like another is so both ways."""
+    clusters: dict[str, set[str]] = {effect: set() for effect in taken_for}
+    for effect, others in taken_for.items():
+        for other in others:
+            clusters[effect].add(other)
+            clusters.setdefault(other, set()).add(effect)
+    return clusters
 
 
 def alias_clusters(cases: list[Score]) -> dict[str, set[str]]:
     """Names that each effect can be taken for: by its nature, and by what diagnoses with the whole library declared."""
-    clusters = {effect: set(names) for effect, names in DECLARED_ALIASES.items()}
+    clusters = either_way(EASILY_TAKEN_FOR)
     for score in cases:
         found = score.finder(score.main)
         if found is not None:
