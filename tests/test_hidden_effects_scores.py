@@ -16,7 +16,7 @@ from tests.benchmarks.hidden_effects.diagnose_case import without_effects
 from tests.benchmarks.hidden_effects.draw import draw_case
 from tests.benchmarks.hidden_effects.generate import case_folder, generate, truth_file
 from tests.benchmarks.hidden_effects.scoring import Score, score_case
-from tests.benchmarks.hidden_effects.table import lines_of, wilson, write_report
+from tests.benchmarks.hidden_effects.table import EASILY_TAKEN_FOR, either_way, lines_of, wilson, write_report
 
 RIPPLE = Planted("torque_ripple", "knee", "library", 0.1, {"order": 5.0, "phase": 0.3}, gap=0.02, torque_share=0.02)
 
@@ -111,3 +111,12 @@ def test_an_effect_can_be_taken_out_of_the_library() -> None:
 def test_wilson_interval_matches_the_published_example() -> None:
     """Newcombe, Statistics in Medicine 17, 1998: 81 of 263 gives 0.2553 to 0.3662."""
     np.testing.assert_allclose(wilson(81, 263), (0.2553, 0.3662), atol=5e-5)
+
+
+def test_what_is_like_another_is_so_either_way() -> None:
+    clusters = either_way(EASILY_TAKEN_FOR)
+    assert all(effect in clusters[other] for effect, others in clusters.items() for other in others)
+    # said of one of each pair only
+    assert "torque_ripple" in clusters["torque_offset"]
+    assert {"backlash", "asymmetric_spring", "base_tilt"} <= clusters["spring_offset"]
+    assert "link_friction" not in clusters["position_delay"]

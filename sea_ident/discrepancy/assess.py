@@ -16,7 +16,7 @@ from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.discrepancy.search import FAMILY_LEVEL, LEAST_OF_A_SIGNAL, Selection, of_every_kind, refitted
-from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
 
@@ -28,13 +28,6 @@ LOOKS_ALIKE = 0.9
 
 RIVALS = 8
 """Candidates that are tried in the place of an effect, and the best of every kind beside them."""
-
-NEARLY_ALL = 0.02
-"""A rival that leaves less than this share of what an effect explains is weighed in the noise floor of its own [-]."""
-
-OF_WHAT_IS_LEFT = 0.2
-"""Share of what a model leaves beyond the noise below which a difference says nothing [-]: what makes the model wrong
-may speak for either."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
@@ -55,7 +48,6 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
         unit = max(fit.statistic / max(fit.dof, 1), 1.0)
-        equal = max(EQUALLY_GOOD * unit, OF_WHAT_IS_LEFT * fit.excess)
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
@@ -67,14 +59,11 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if slowest(new.effects[position]):
                 continue
-            if equal <= new.statistic - fit.statistic < NEARLY_ALL * gain:
-                # the noise of the encoders enters by way of the model: by the floor of another it may be twice as large
-                new = settle_again(bench, new).fit
-            if new.statistic - fit.statistic < equal and physical(bench, new, position):
+            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
                 other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-                if new.statistic - fit.statistic + price < equal:
+                if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit:
                     alike.append(other)
                     scores.append(new.statistic)
                 else:

@@ -42,12 +42,17 @@ class AsymmetricSpring(SpringEffect):
         return (Column(self.parameter_name(), unit, self.name, self.joint, self.side),)
 
     def variants(self, state: State) -> tuple["AsymmetricSpring", ...]:
-        """Exponents with the kink where the spring is at rest, and kinks elsewhere between two straight sides."""
-        largest = float(np.abs(state.motion.deflection[:, state.robot.index(self.required_joint)]).max())
+        """Exponents with the kink where the spring is at rest, and kinks elsewhere between two straight sides.
+
+        A kink that the motion does not reach is tried only where it does not pass the rest of the spring either.
+        """
+        deflection = state.motion.deflection[:, state.robot.index(self.required_joint)]
+        low, high = float(deflection.min()), float(deflection.max())
+        kinks = (share * max(-low, high) for share in KINKS)
         exponents = (float(exponent) for exponent in self.shapes[0].grid())
         return (
             *(replace(self, exponent=exponent, kink=0.0) for exponent in exponents),
-            *(replace(self, exponent=1.0, kink=share * largest) for share in KINKS),
+            *(replace(self, exponent=1.0, kink=kink) for kink in kinks if low * high > 0.0 or low < kink < high),
         )
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:

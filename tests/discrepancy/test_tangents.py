@@ -153,3 +153,29 @@ def test_moved_counts_factors_and_ranges():
     assert moved(stribeck, speed, 0.5).speed == pytest.approx(0.1 * np.exp(0.5))
     assert moved(stribeck, exponent, 0.2).exponent == pytest.approx(1.0 + 0.2 * (exponent.upper - exponent.lower))
     assert moved(stribeck, speed, 50.0).speed == speed.upper
+
+
+@pytest.mark.parametrize(
+    "signal",
+    [
+        make_effect("position_delay", "ankle", delay=0.002),
+        make_effect("encoder_eccentricity", "ankle", sine=0.004, cosine=-0.003),
+        make_effect("link_flexibility", "ankle", compliance=1e-3, stiffness=120.0),
+    ],
+    ids=lambda e: e.name,
+)
+def test_stiffness_of_a_link_is_that_of_the_spring_before_its_encoder(nothing_missing, signal):
+    """What an encoder shows late or wrongly is no deflection; what bends behind it makes no spring before it softer."""
+    bench, _ = nothing_missing
+    effects = (*bench.effects, signal)
+    whole = 120.0 / (1.0 + getattr(signal, "compliance", 0.0) * 120.0)
+    fit = bench.predicted(effects, {"ankle.spring_stiffness": whole})
+    ankle = next(e for e in bench.links if bench.data.equations[e].joint == "ankle")
+    assert bench.stiffness_of(fit)[ankle] == pytest.approx(120.0, rel=1e-6)
+    assert fit.scale[ankle] == pytest.approx(bench.first_stiffness[ankle] / 120.0, rel=1e-6)
+
+
+def test_a_model_as_it_is_has_the_scale_that_its_fit_has(nothing_missing):
+    bench, now = nothing_missing
+    fit = now.fit
+    np.testing.assert_allclose(bench.predicted(fit.effects, fit.parameters).scale, fit.scale, rtol=1e-12)

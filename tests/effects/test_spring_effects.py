@@ -1,11 +1,12 @@
 """The springs of the paper (eq. 21), against the equation written out."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
 from sea_ident.base_parameters import random_motion
-from sea_ident.effects import State, spring_effects
+from sea_ident.effects import State, make_effect, spring_effects
 from sea_ident.robot import load_robot, robot_from_text
 
 
@@ -32,3 +33,34 @@ def test_what_the_description_does_not_state_is_not_zero_but_unknown():
     assert robot.elastic == leg.elastic
     for effect in spring_effects(robot):
         assert np.all(np.isnan(effect.prior(robot)))
+
+
+def test_widths_of_play_that_a_search_tries_leave_no_gap_where_the_deflection_keeps_its_sign():
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=200, seed=4)
+    # from 20 to 30 mrad: play below 20 never closes, and only its stiffness times its width shows
+    theta = motion.q + 0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None]
+    one_way = replace(motion, theta=theta)
+    widths = [v.half_width for v in make_effect("backlash", "knee").variants(State(leg, one_way))]
+    assert np.all(np.diff(widths) > 0.0)
+    assert np.max(np.array(widths[1:]) / np.array(widths[:-1])) <= 2.0 + 1e-9
+    offset = 0.008 * 200.0
+    fitting = [v for v in widths if v < 0.02 and make_effect("backlash", "knee", half_width=v).plausible(
+        np.array([offset / v]), {"knee.spring_stiffness": 200.0})]  # fmt: skip
+    assert len(fitting) >= 2
+
+
+def test_a_kink_that_is_not_passed_is_an_offset_and_a_stiffer_spring():
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=200, seed=4)
+    kink = float(motion.deflection[:, 1].min()) - 0.01
+    column = make_effect("asymmetric_spring", "knee", kink=kink).evaluate(State(leg, motion)).motor[:, 1, 0]
+    np.testing.assert_allclose(column, motion.deflection[:, 1] - kink, rtol=1e-12)
+    passed = make_effect("asymmetric_spring", "knee", kink=kink + 0.02).evaluate(State(leg, motion)).motor[:, 1, 0]
+    np.testing.assert_allclose(passed, np.abs(motion.deflection[:, 1] - kink - 0.02), rtol=1e-12)
+
+
+def test_a_spring_of_two_straight_sides_pushes_back_on_both():
+    spring = make_effect("asymmetric_spring", "knee", kink=0.01)
+    assert spring.plausible(np.array([150.0]), {"knee.spring_stiffness": 200.0})
+    assert not spring.plausible(np.array([-250.0]), {"knee.spring_stiffness": 200.0})

@@ -1,0 +1,101 @@
+"""What else an effect could be: what gives the same torque is declared, what does not is not, however it is written."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.assess import rivals, transfer
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.decide import decide, declared
+from sea_ident.discrepancy.findings import Alternative
+from sea_ident.discrepancy.heldout import tried
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
+from sea_ident.effects import make_effect
+
+OFFSETS = [("spring_offset", "hip", [-1.2], {}), ("spring_offset", "knee", [-0.4], {})]
+"""As much as the play of 2 mrad would take from the spring of the hip, whose deflection keeps its sign in both motions;
+that of the knee passes zero."""
+
+
+@pytest.fixture(scope="module")
+def preloaded(laboratory):
+    """A leg with loaded springs on the bench, what its model lacks, and another motion of it."""
+    bench = laboratory.bench(laboratory.record(OFFSETS, periods=8))
+    other = Bench(laboratory.data(laboratory.record(OFFSETS, periods=4, seed=9, motion=1)), bench.effects)
+    start = settle(bench, bench.effects)
+    effects = (*start.fit.effects, *(make_effect(name, joint) for name, joint, _, _ in OFFSETS))
+    final = settle_again(bench, bench.fit(effects, start.noise, start=start.fit.parameters))
+    return bench, other, Selection(start, final, 2, (1e-9, 1e-9))
+
+
+def written_as(preloaded, effect):
+    """The model with the offset of the hip written as another effect."""
+    bench, _, selection = preloaded
+    final, first = selection.final, len(selection.start.fit.effects)
+    effects = list(final.fit.effects)
+    effects[first] = effect
+    return bench.fit(effects, final.noise, start=final.fit.parameters)
+
+
+SAME_TORQUE = [
+    make_effect("backlash", "hip", half_width=0.0011),
+    make_effect("asymmetric_spring", "hip", kink=-0.01),
+    make_effect("asymmetric_spring", "hip", kink=0.003),
+]
+
+
+def test_play_that_never_closes_and_a_kink_never_passed_are_declared_beside_an_offset(preloaded):
+    bench, _, selection = preloaded
+    first = len(selection.start.fit.effects)
+    found = declared(rivals(bench, selection))
+    hip, knee = ({a.effect for a in found[position] if a.joint == joint} for position, joint in
+                 ((first, "hip"), (first + 1, "knee")))  # fmt: skip
+    assert {"backlash", "asymmetric_spring"} <= hip
+    assert not {"backlash", "asymmetric_spring"} & knee
+
+
+@pytest.mark.parametrize("effect", SAME_TORQUE, ids=lambda e: f"{e.name} {getattr(e, 'kink', '')}")
+def test_a_transfer_is_the_same_however_the_same_torque_is_written(preloaded, effect):
+    """A kink takes a part of the stiffness along: that part is there too where the effect is held."""
+    _, other, selection = preloaded
+    fit = written_as(preloaded, effect)
+    assert fit.statistic == pytest.approx(selection.final.fit.statistic, rel=1e-3)
+    found = []
+    for each in (selection.final.fit, fit):
+        now = settle_again(other, other.predicted(each.effects, each.parameters))
+        found.append(transfer(other, replace(selection, final=Settled(each, selection.final.noise)), now)[0])
+    assert found[1].statistic == pytest.approx(found[0].statistic, rel=2e-3)
+    assert found[1].holds
+
+
+def test_a_width_that_the_motion_leaves_open_is_no_reason_to_rule_play_out(preloaded):
+    bench, other, selection = preloaded
+    first = len(selection.start.fit.effects)
+    wide = written_as(preloaded, make_effect("backlash", "hip", half_width=0.007))
+    listed = {first: (Alternative("backlash", "hip", 1.0, wide),), first + 1: ()}
+    held = tried(other, selection, "another motion")
+    as_found = tried(other, replace(selection, final=Settled(wide, selection.final.noise)), "another motion")
+    assert as_found.transfers[0].statistic > held.transfers[0].statistic + 50.0
+    chosen, left, _ = decide(bench, selection, listed, held)
+    assert chosen.effects[0].name == "spring_offset"
+    assert [a.effect for a in left[first]] == ["backlash"]
+    width = left[first][0].fit.effects[first].half_width
+    assert width < np.min(other.data.motion.deflection[:, 0]) * 1.5
+
+
+def test_more_parameters_are_no_alternative_unless_another_motion_asks_for_them(preloaded):
+    bench, other, selection = preloaded
+    first = len(selection.start.fit.effects)
+    fit = written_as(preloaded, SAME_TORQUE[0])
+    listed = {first: (Alternative("backlash", "hip", 1.0, fit, dearer=True),), first + 1: ()}
+    assert declared(listed) == {first: (), first + 1: ()}
+    _, left, _ = decide(bench, selection, listed, tried(other, selection, "another motion"))
+    assert left[first] == ()
+    # now the motion that decides shows that what was named does not hold
+    own = written_as(preloaded, make_effect("backlash", "hip", half_width=0.007))
+    wrong = replace(selection, final=Settled(own, selection.final.noise))
+    listed = {first: (Alternative("spring_offset", "hip", 1.0, selection.final.fit, dearer=True),), first + 1: ()}
+    chosen, _, _ = decide(bench, wrong, listed, tried(other, wrong, "another motion"))
+    assert chosen.effects[0].name == "spring_offset"
