@@ -14,6 +14,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import solve
+from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.regressor import prior_parameters
@@ -27,8 +28,8 @@ MOST_ROUNDS = 10
 STANDS = 1e-3
 """A step that takes less than this share of what is left was the last [-]."""
 
-CLEARLY = 0.7
-"""Share of what another model leaves, all equations counting alike, below which a beginning is worth a fit [-]."""
+ELSEWHERE = 0.2
+"""Share of an amount from which on a difference makes it another place [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +46,39 @@ class Beginning:
     parameters: dict[str, float]
     left: FloatArray
 
-    def better_than(self, bench: Bench, fit: Fit) -> bool:
-        """Whether clearly less is left than by a fit."""
-        other = bench.whitening(None).flat(fit.residual)
-        return float(np.linalg.norm(self.left)) < CLEARLY * float(np.linalg.norm(other))
+
+def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFloor) -> Fit:
+    """A model whose effect in the chain of signals may have ended in the wrong place, begun from described springs.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        position: of the effect in it.
+        noise: noise floor.
+
+    Returns:
+        The fit that comes of the other beginning where that is another place and better, else the fit as it is.
+    """
+    before, effect, after = fit.effects[:position], fit.effects[position], fit.effects[position + 1 :]
+    if not isinstance(effect, SignalEffect):
+        return fit
+    begun = begin_as_described(bench, before, effect, after)
+    if begun is None or not _elsewhere(effect, begun.effect):
+        return fit
+    if np.linalg.norm(begun.left) > np.linalg.norm(bench.whitening(None).flat(fit.residual)):
+        return fit
+    model = (*before, begun.effect, *after)
+    # the noise floor of a model that has bent its springs is as wrong as they are
+    own = bench.noise(bench.predicted(model, begun.parameters))
+    right = bench.refine(model, own, start=begun.parameters, only=len(bench.effects))
+    new = bench.refine(right.effects, noise, start=right.parameters, only=len(bench.effects))
+    return min((fit, new), key=lambda one: (len(bench.slack_links(one)), one.statistic))
+
+
+def _elsewhere(one: SignalEffect, other: SignalEffect) -> bool:
+    """Whether the amounts of two differ by more than two steps on one way do."""
+    pairs = [(float(getattr(one, amount.name)), float(getattr(other, amount.name))) for amount in one.amounts]
+    return any(abs(here - there) > ELSEWHERE * max(abs(here), abs(there)) for here, there in pairs)
 
 
 def begin_as_described(

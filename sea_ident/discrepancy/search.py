@@ -8,7 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
-from sea_ident.discrepancy.described import begin_as_described
+from sea_ident.discrepancy.described import from_described_springs
 from sea_ident.discrepancy.edges import with_sharp_edges
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
@@ -68,7 +68,10 @@ LAST_TWO = 2
 """Of these the best are compared with the shapes of the model refined too."""
 
 LITTLE_LEFT = 0.02
-"""An effect that leaves less than this share of the excess is only compared with those that promise more than it."""
+"""An effect that leaves less than this share of the excess is compared only with what promises more than it, ..."""
+
+NEARLY_RIGHT = 3.0
+"""... once one leaves less than this statistic over degrees of freedom."""
 
 RIGHT = 1.2
 """Statistic over degrees of freedom up to which no other effect is tried in the place of one that was added."""
@@ -177,9 +180,9 @@ def _next(
     ]
     accepted: list[tuple[float, Fit, float]] = []
     periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
-    most = 0.0
+    most, explained = 0.0, False
     for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
-        if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most:
+        if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most and explained:
             continue
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters)
         gain = fit.statistic - new.statistic
@@ -187,7 +190,7 @@ def _next(
         if p_value > FAMILY_LEVEL or not _acceptable(bench, fit, new, periods, smallest):
             continue
         accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
-        most = max(most, gain)
+        most, explained = max(most, gain), explained or new.statistic < NEARLY_RIGHT * new.dof
     if not accepted:
         return None
     accepted.sort(key=lambda item: item[0])
@@ -249,14 +252,8 @@ def refitted(
         begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
     fits = [bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun]
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
-    described = begin_as_described(bench, before, effect, after) if isinstance(effect, SignalEffect) else None
-    if described is not None and described.better_than(bench, best):
-        model = (*before, described.effect, *after)
-        first = bench.fit(model, noise, start=described.parameters)
-        # the noise floor of a model that has bent its springs is as wrong as they are
-        own = bench.refine(model, bench.noise(first), start=described.parameters, only=len(bench.effects))
-        new = bench.refine(own.effects, noise, start=own.parameters, only=len(bench.effects))
-        best = min((best, new), key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
+    if isinstance(effect, SignalEffect):
+        best = from_described_springs(bench, best, len(before), noise)
     return with_sharp_edges(bench, best, noise, len(before))
 
 

@@ -1,0 +1,74 @@
+"""Large errors of encoders: a model without them bends its springs, and the way back begins at the description."""
+
+import re
+
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.described import begin_as_described
+from sea_ident.discrepancy.search import refitted, search
+from sea_ident.discrepancy.settle import settle
+from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.robot import load_robot
+
+pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+
+LARGE = {
+    "encoder_offset": {"offset": 0.08},
+    "encoder_eccentricity": {"sine": 0.05, "cosine": 0.05},
+    "position_delay": {"delay": 0.02},
+}
+
+
+@pytest.fixture(scope="module")
+def softer(leg, tmp_path_factory):
+    """The leg by a description that makes its springs a quarter too soft."""
+    text, times = re.subn(r'(stiffness|cubicStiffness)="([^"]+)"', lambda m: f'{m[1]}="{0.75 * float(m[2])}"', leg.urdf)
+    assert times == 6, times
+    file = tmp_path_factory.mktemp("softer") / "softer.urdf"
+    file.write_text(text)
+    return load_robot(file)
+
+
+def recorded_as(laboratory, robot, effect, joint, shape):
+    """A recording of the leg with an error, on the bench of a robot that describes it."""
+    recording = laboratory.record([(effect, joint, [], shape)], periods=6)
+    data = period_data(wide_processing(recording, robot, 5.0), robot)
+    return Bench(data, (*base_effects(robot), *spring_effects(robot)))
+
+
+@pytest.mark.parametrize("effect", list(LARGE))
+def test_amounts_begin_right_with_springs_that_are_described_wrong(laboratory, softer, effect):
+    bench = recorded_as(laboratory, softer, effect, "ankle", LARGE[effect])
+    begun = begin_as_described(bench, bench.effects, make_effect(effect, "ankle"), ())
+    for name, value in LARGE[effect].items():
+        assert getattr(begun.effect, name) == pytest.approx(value, rel=0.03)
+    assert begun.parameters["ankle.spring_stiffness"] == pytest.approx(120.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("effect", "joint"), [("encoder_eccentricity", "ankle"), ("encoder_offset", "hip")])
+def test_a_large_error_of_an_encoder_is_found(laboratory, effect, joint):
+    bench = laboratory.bench(laboratory.record([(effect, joint, [], LARGE[effect])], periods=6))
+    found = search(bench, bench.effects)
+    assert [(e.name, e.joint) for e in found.effects] == [(effect, joint)]
+    for name, value in LARGE[effect].items():
+        assert getattr(found.effects[0], name) == pytest.approx(value, rel=0.01)
+    assert found.final.fit.statistic < 1.2 * found.final.fit.dof
+
+
+def test_the_wrong_side_of_zero_is_left_for_the_right_one(laboratory):
+    bench = laboratory.bench(laboratory.record([("encoder_offset", "ankle", [], {"offset": 0.08})], periods=6))
+    now = settle(bench, bench.effects)
+    wrong = make_effect("encoder_offset", "ankle", offset=-0.07)
+    new = refitted(bench, now.fit.effects, wrong, (), now.noise, now.fit.parameters)
+    assert new.effects[-1].offset == pytest.approx(0.08, rel=0.01)
+
+
+def test_no_beginning_without_a_spring_that_is_described(laboratory, leg, tmp_path):
+    file = tmp_path / "unknown.urdf"
+    file.write_text(leg.urdf.replace('stiffness="120" cubicStiffness="4000" damping="0.25"', ""))
+    bench = recorded_as(laboratory, load_robot(file), "encoder_offset", "knee", {"offset": 0.03})
+    assert begin_as_described(bench, bench.effects, make_effect("encoder_offset", "ankle"), ()) is None
+    begun = begin_as_described(bench, bench.effects, make_effect("encoder_offset", "knee"), ())
+    assert begun.effect.offset == pytest.approx(0.03, rel=0.1)
