@@ -62,12 +62,12 @@ def decide(
                 effects = list(selection.final.fit.effects)
                 effects[position] = fit.effects[position]
                 fit = bench.fit(effects, noise, start=selection.final.fit.parameters)
-            replaced = replace(selection, final=Settled(fit, bench.noise(fit)))
+            replaced = replace(selection, final=Settled(fit, noise))
             there = tried(held.bench, replaced, held.source)
             rival = there.transfers[position - first]
             if _better(rival, own):
                 before = selection.final.fit
-                selection, changed = replaced, True
+                selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
                 held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
                 # what was no better than the one that is now out was no better than this one
                 left = []
@@ -109,6 +109,7 @@ def _with_another_shape(
     noise = bench.noise(fit)
     enough = EQUALLY_GOOD * max(fit.statistic / max(fit.dof, 1), 1.0)
     for ways in _other_shapes(bench, fit, position):
+        last = found
         for effect in ways:
             effects = list(fit.effects)
             effects[position] = effect
@@ -119,10 +120,10 @@ def _with_another_shape(
             result = there.transfers[position - len(effects) + selection.added]
             if not _better(own, result):
                 return other
-            if result.statistic > found.statistic - EQUALLY_GOOD * found.unit:
+            if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:
                 # no better this way
                 break
-            found = result
+            last = result
     return None
 
 
