@@ -11,13 +11,16 @@ from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut, tried
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 
 Alternatives = dict[int, tuple[Alternative, ...]]
+
+CLEARLY = 1.0
+"""What a simpler effect must save, in units of the statistic."""
 
 OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 """Factors by which a shape is moved where it may be open."""
@@ -26,6 +29,49 @@ OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 def declared(alternatives: Mapping[int, tuple[Alternative, ...]]) -> Alternatives:
     """The alternatives of each effect that are as likely where no other motion decides."""
     return {position: tuple(a for a in others if not a.dearer) for position, others in alternatives.items()}
+
+
+def simplest_first(
+    bench: Bench, selection: Selection, alternatives: Mapping[int, tuple[Alternative, ...]]
+) -> tuple[Selection, Alternatives]:
+    """Of effects that one motion does not tell apart, the one with the fewest parameters is the one that is named.
+
+    A search compares them in the noise floor of a model that lacks them all, where the difference may be larger.
+
+    Args:
+        bench: the recording.
+        selection: what was found.
+        alternatives: what else each effect could be, by its position in the model.
+
+    Returns:
+        The selection with the simplest, and what else each of its effects could be.
+    """
+    kept: Alternatives = {}
+    changed = False
+    for position, others in alternatives.items():
+        now = selection.final.fit
+        own = now.effects[position]
+        if changed:
+            others = tuple(replace(a, fit=None if a.fit is None else _beside(bench, selection, position, a.fit))
+                           for a in others)  # fmt: skip
+        best, price = None, now.statistic + penalty(own, bench) - CLEARLY
+        for other in others:
+            if other.fit is not None and other.fit.statistic + penalty(other.fit.effects[position], bench) < price:
+                best, price = other, other.fit.statistic + penalty(other.fit.effects[position], bench)
+        if best is not None and best.fit is not None:
+            selection = replace(selection, final=Settled(best.fit, selection.final.noise))
+            out = Alternative(own.name, own.joint, best.cos2, now)
+            others, changed = (out, *(a for a in others if a is not best)), True
+        kept[position] = others
+    return selection, kept
+
+
+def _beside(bench: Bench, selection: Selection, position: int, fit: Fit) -> Fit:
+    """A fit with another effect at a position, beside the effects that a selection has by now."""
+    now = selection.final
+    effects = list(now.fit.effects)
+    effects[position] = fit.effects[position]
+    return bench.fit(effects, now.noise, start=now.fit.parameters)
 
 
 def decide(
@@ -45,7 +91,7 @@ def decide(
     """
     kept: Alternatives = {}
     first = len(selection.final.fit.effects) - selection.added
-    noise, changed = selection.final.noise, False
+    changed = False
     for position, others in alternatives.items():
         own = held.transfers[position - first]
         left: list[Alternative] = []
@@ -59,10 +105,8 @@ def decide(
                 continue
             if changed:
                 # it was fitted beside an effect that is out by now
-                effects = list(selection.final.fit.effects)
-                effects[position] = fit.effects[position]
-                fit = bench.fit(effects, noise, start=selection.final.fit.parameters)
-            replaced = replace(selection, final=Settled(fit, noise))
+                fit = _beside(bench, selection, position, fit)
+            replaced = replace(selection, final=Settled(fit, selection.final.noise))
             there = tried(held.bench, replaced, held.source)
             rival = there.transfers[position - first]
             if _better(rival, own):
