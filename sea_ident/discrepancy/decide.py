@@ -1,6 +1,6 @@
 """What one motion does not tell apart another may: equals are compared on data that were not used."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -93,6 +93,8 @@ def decide(
     first = len(selection.final.fit.effects) - selection.added
     changed = False
     for position, others in alternatives.items():
+        if not changed:
+            selection, held = _with_its_best_shape(bench, selection, held, position)
         own = held.transfers[position - first]
         left: list[Alternative] = []
         for other in others:
@@ -133,23 +135,47 @@ def decide(
 def _with_another_shape(
     bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
 ) -> Fit | None:
-    """A fit whose effect the other motion rules out, with a shape with which it does not.
+    """A fit whose effect the other motion rules out, with a shape with which it does not; None where there is none."""
+    own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
+    for other, result, _ in _open_shapes(bench, selection, held, position, fit, found):
+        if not _better(own, result):
+            return other
+    return None
+
+
+def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, position: int) -> tuple[Selection, HeldOut]:
+    """A selection with the shape of one effect that holds best on the other motion, of those that the first allows."""
+    fit = selection.final.fit
+    best = held.transfers[position - len(fit.effects) + selection.added]
+    if best.excess < EQUALLY_GOOD * best.unit:
+        return selection, held
+    for other, result, there in _open_shapes(bench, selection, held, position, fit, best):
+        if _better(result, best):
+            best, selection = result, replace(selection, final=Settled(other, selection.final.noise))
+            held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
+    return selection, held
+
+
+def _open_shapes(
+    bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
+) -> Iterator[tuple[Fit, Transfer, HeldOut]]:
+    """A fit with other shapes of one effect that do as well on the motion that was used.
 
     A motion may leave a shape open: play that is never closed is the same torque whatever its width. Then only all the
     shapes that it leaves open together can be ruled out.
 
     Args:
         bench: the recording that was used.
-        selection: what holds on the other motion.
-        held: the other motion, with what it is worth there.
-        position: of the effect in both models.
-        fit: the model with the effect that is ruled out as it was found, ...
+        selection: what was found.
+        held: the other motion.
+        position: of the effect.
+        fit: the model with the effect as it was found, ...
         found: ... and what it is worth on the other motion.
 
-    Returns:
-        The model with another shape; None where there is none that both motions allow.
+    Yields:
+        The model with another shape, and what it is worth on the other motion; the next one in a direction only where
+        the last was better.
     """
-    own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
     noise = bench.noise(fit)
     enough = EQUALLY_GOOD * max(fit.statistic / max(fit.dof, 1), 1.0)
     for ways in _other_shapes(bench, fit, position):
@@ -162,13 +188,10 @@ def _with_another_shape(
                 break
             there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
             result = there.transfers[position - len(effects) + selection.added]
-            if not _better(own, result):
-                return other
+            yield other, result, there
             if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:
-                # no better this way
                 break
             last = result
-    return None
 
 
 def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:

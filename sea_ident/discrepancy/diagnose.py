@@ -199,9 +199,9 @@ def _tested(
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
-    if any(alternatives.values()):
+    if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
-        confirmed = confirmed.less(selection)
+        confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     weak = [k for k, found in enumerate(held.transfers) if not found.holds]
     if 0 < len(weak) < confirmed.selection.added + len(trends.trends):
         selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
@@ -209,8 +209,7 @@ def _tested(
             tried(held.bench, selection, held.source),
             processed=held.processed, recording=held.recording, warnings=held.warnings,
         )  # fmt: skip
-        if any(alternatives.values()):
-            selection, alternatives, held = decide(bench, selection, alternatives, held)
+        selection, alternatives, held = decide(bench, selection, alternatives, held)
         confirmed = confirmed.less(selection)
     return confirmed, alternatives, held, notes
 
