@@ -7,15 +7,14 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.bench import Bench, Known
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
-from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
-from sea_ident.discrepancy.search import FAMILY_LEVEL, LEAST_OF_A_SIGNAL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
@@ -52,8 +51,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
         tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)]
-        for candidate in of_every_kind(tried, RIVALS, own.joint):
-            if candidate.gain < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.3) * gain:
+        for candidate in of_every_kind(tried, RIVALS):
+            if candidate.gain < 0.3 * gain:
                 continue
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             price = penalty(candidate.effect, bench) - penalty(own, bench)

@@ -1,14 +1,13 @@
 """The working bench: models made of effects, fitted to one recording in its noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import off, solve
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
@@ -47,19 +46,6 @@ would carry it anywhere, and hold up the others."""
 
 RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
-
-
-@dataclass(frozen=True, eq=False)
-class Known:
-    """What is there beside a model that is fitted.
-
-    Attributes:
-        torque: (H + 1, E) [N m].
-        stiffness: (E,) what it adds to the slope of the spring torque of a link over its deflection.
-    """
-
-    torque: ComplexArray
-    stiffness: FloatArray
 
 
 class Bench(Tangents):

@@ -1,6 +1,6 @@
 """What one motion does not tell apart another may: equals are compared on data that were not used."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +11,16 @@ from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut, tried
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 
 Alternatives = dict[int, tuple[Alternative, ...]]
+
+CLEARLY = 1.0
+"""What a simpler effect must save, in units of the statistic."""
 
 OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 """Factors by which a shape is moved where it may be open."""
@@ -26,6 +29,49 @@ OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 def declared(alternatives: Mapping[int, tuple[Alternative, ...]]) -> Alternatives:
     """The alternatives of each effect that are as likely where no other motion decides."""
     return {position: tuple(a for a in others if not a.dearer) for position, others in alternatives.items()}
+
+
+def simplest_first(
+    bench: Bench, selection: Selection, alternatives: Mapping[int, tuple[Alternative, ...]]
+) -> tuple[Selection, Alternatives]:
+    """Of effects that one motion does not tell apart, the one with the fewest parameters is the one that is named.
+
+    A search compares them in the noise floor of a model that lacks them all, where the difference may be larger.
+
+    Args:
+        bench: the recording.
+        selection: what was found.
+        alternatives: what else each effect could be, by its position in the model.
+
+    Returns:
+        The selection with the simplest, and what else each of its effects could be.
+    """
+    kept: Alternatives = {}
+    changed = False
+    for position, others in alternatives.items():
+        now = selection.final.fit
+        own = now.effects[position]
+        if changed:
+            others = tuple(replace(a, fit=None if a.fit is None else _beside(bench, selection, position, a.fit))
+                           for a in others)  # fmt: skip
+        best, price = None, now.statistic + penalty(own, bench) - CLEARLY
+        for other in others:
+            if other.fit is not None and other.fit.statistic + penalty(other.fit.effects[position], bench) < price:
+                best, price = other, other.fit.statistic + penalty(other.fit.effects[position], bench)
+        if best is not None and best.fit is not None:
+            selection = replace(selection, final=Settled(best.fit, selection.final.noise))
+            out = Alternative(own.name, own.joint, best.cos2, now)
+            others, changed = (out, *(a for a in others if a is not best)), True
+        kept[position] = others
+    return selection, kept
+
+
+def _beside(bench: Bench, selection: Selection, position: int, fit: Fit) -> Fit:
+    """A fit with another effect at a position, beside the effects that a selection has by now."""
+    now = selection.final
+    effects = list(now.fit.effects)
+    effects[position] = fit.effects[position]
+    return bench.fit(effects, now.noise, start=now.fit.parameters)
 
 
 def decide(
@@ -45,8 +91,10 @@ def decide(
     """
     kept: Alternatives = {}
     first = len(selection.final.fit.effects) - selection.added
-    noise, changed = selection.final.noise, False
+    changed = False
     for position, others in alternatives.items():
+        if not changed:
+            selection, held = _with_its_best_shape(bench, selection, held, position)
         own = held.transfers[position - first]
         left: list[Alternative] = []
         for other in others:
@@ -59,15 +107,13 @@ def decide(
                 continue
             if changed:
                 # it was fitted beside an effect that is out by now
-                effects = list(selection.final.fit.effects)
-                effects[position] = fit.effects[position]
-                fit = bench.fit(effects, noise, start=selection.final.fit.parameters)
-            replaced = replace(selection, final=Settled(fit, bench.noise(fit)))
+                fit = _beside(bench, selection, position, fit)
+            replaced = replace(selection, final=Settled(fit, selection.final.noise))
             there = tried(held.bench, replaced, held.source)
             rival = there.transfers[position - first]
             if _better(rival, own):
                 before = selection.final.fit
-                selection, changed = replaced, True
+                selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
                 held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
                 # what was no better than the one that is now out was no better than this one
                 left = []
@@ -89,26 +135,51 @@ def decide(
 def _with_another_shape(
     bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
 ) -> Fit | None:
-    """A fit whose effect the other motion rules out, with a shape with which it does not.
+    """A fit whose effect the other motion rules out, with a shape with which it does not; None where there is none."""
+    own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
+    for other, result, _ in _open_shapes(bench, selection, held, position, fit, found):
+        if not _better(own, result):
+            return other
+    return None
+
+
+def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, position: int) -> tuple[Selection, HeldOut]:
+    """A selection with the shape of one effect that holds best on the other motion, of those that the first allows."""
+    fit = selection.final.fit
+    best = held.transfers[position - len(fit.effects) + selection.added]
+    if best.excess < EQUALLY_GOOD * best.unit:
+        return selection, held
+    for other, result, there in _open_shapes(bench, selection, held, position, fit, best):
+        if _better(result, best):
+            best, selection = result, replace(selection, final=Settled(other, selection.final.noise))
+            held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
+    return selection, held
+
+
+def _open_shapes(
+    bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
+) -> Iterator[tuple[Fit, Transfer, HeldOut]]:
+    """A fit with other shapes of one effect that do as well on the motion that was used.
 
     A motion may leave a shape open: play that is never closed is the same torque whatever its width. Then only all the
     shapes that it leaves open together can be ruled out.
 
     Args:
         bench: the recording that was used.
-        selection: what holds on the other motion.
-        held: the other motion, with what it is worth there.
-        position: of the effect in both models.
-        fit: the model with the effect that is ruled out as it was found, ...
+        selection: what was found.
+        held: the other motion.
+        position: of the effect.
+        fit: the model with the effect as it was found, ...
         found: ... and what it is worth on the other motion.
 
-    Returns:
-        The model with another shape; None where there is none that both motions allow.
+    Yields:
+        The model with another shape, and what it is worth on the other motion; the next one in a direction only where
+        the last was better.
     """
-    own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
     noise = bench.noise(fit)
     enough = EQUALLY_GOOD * max(fit.statistic / max(fit.dof, 1), 1.0)
     for ways in _other_shapes(bench, fit, position):
+        last = found
         for effect in ways:
             effects = list(fit.effects)
             effects[position] = effect
@@ -117,13 +188,10 @@ def _with_another_shape(
                 break
             there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
             result = there.transfers[position - len(effects) + selection.added]
-            if not _better(own, result):
-                return other
-            if result.statistic > found.statistic - EQUALLY_GOOD * found.unit:
-                # no better this way
+            yield other, result, there
+            if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:
                 break
-            found = result
-    return None
+            last = result
 
 
 def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:

@@ -14,7 +14,7 @@ from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.decide import Alternatives, decide, declared
+from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
@@ -109,7 +109,10 @@ def diagnose(
         found = _searched(bench, temperature, tell)
     bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
-    alternatives = assess.rivals(bench, confirmed.selection) if basic is None else {}
+    alternatives: Alternatives = {}
+    if basic is None:
+        selection, alternatives = _with_alternatives(bench, confirmed.selection)
+        confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     tell("testing on held-out data", 0.75)
     confirmed, alternatives, held, held_notes = _tested(bench, confirmed, alternatives, trends, holdout)
     selection = confirmed.selection
@@ -196,21 +199,24 @@ def _tested(
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
-    if any(alternatives.values()):
+    if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
-        confirmed = confirmed.less(selection)
+        confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     weak = [k for k, found in enumerate(held.transfers) if not found.holds]
     if 0 < len(weak) < confirmed.selection.added + len(trends.trends):
-        selection = without(bench, confirmed.selection, weak)
-        alternatives = assess.rivals(bench, selection)
+        selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
         held = replace(
             tried(held.bench, selection, held.source),
             processed=held.processed, recording=held.recording, warnings=held.warnings,
         )  # fmt: skip
-        if any(alternatives.values()):
-            selection, alternatives, held = decide(bench, selection, alternatives, held)
+        selection, alternatives, held = decide(bench, selection, alternatives, held)
         confirmed = confirmed.less(selection)
     return confirmed, alternatives, held, notes
+
+
+def _with_alternatives(bench: Bench, selection: Selection) -> tuple[Selection, Alternatives]:
+    """What was found, the simplest of what this motion does not tell apart, and what else it could be."""
+    return simplest_first(bench, selection, assess.rivals(bench, selection))
 
 
 def _unsearched(bench: Bench) -> Selection:

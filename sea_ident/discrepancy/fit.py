@@ -67,3 +67,16 @@ class Fit:
         """Columns of one effect, given the number of columns of every effect."""
         start = int(sum(robot_columns[:position]))
         return slice(start, start + int(robot_columns[position]))
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is there beside a model that is fitted.
+
+    Attributes:
+        torque: (H + 1, E) [N m].
+        stiffness: (E,) what it adds to the slope of the spring torque of a link over its deflection.
+    """
+
+    torque: ComplexArray
+    stiffness: FloatArray

@@ -30,6 +30,7 @@ from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect, Shape
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring import SpringEffect
 
 FAMILY_LEVEL = 1e-3
 """Probability of accepting anything where nothing is missing."""
@@ -254,6 +255,12 @@ def refitted(
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     if isinstance(effect, SignalEffect):
         best = from_described_springs(bench, best, len(before), noise)
+    if isinstance(effect, SpringEffect):
+        # the law of the spring was another one as long as the effect was missing
+        anchored = list(best.effects)
+        anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
+        if tuple(anchored) != best.effects:
+            best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects))
     return with_sharp_edges(bench, best, noise, len(before))
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape, State
+from sea_ident.effects.base import Anchor, Column, Shape, State
 from sea_ident.effects.spring import SpringEffect, deflections
 from sea_ident.robot import Robot
 
@@ -19,16 +19,19 @@ between the spring's own stiffness and its double must not be stepped over."""
 
 @dataclass(frozen=True)
 class Backlash(SpringEffect):
-    """-K clip(theta - q, -w, w): within the play the spring carries nothing.
+    """-K (c + r (d^3 - (d - c)^3)), d = theta - q, c = clip(d, -w, w): within the play the spring carries nothing.
 
-    K is the stiffness of the spring; it is fitted on its own.
+    With K the stiffness of the spring and r its cubic stiffness over K, what is left is the torque of the spring at
+    d - c. K is fitted on its own.
 
     Attributes:
         joint: joint at which it acts.
         half_width: w [rad] or [m].
+        cubic: r of the spring that the play is in series with [1/rad2] or [1/m2].
     """
 
     half_width: float = 0.003
+    cubic: float = 0.0
 
     name: ClassVar[str] = "backlash"
     source: ClassVar[str] = "Nordin, Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002"
@@ -38,6 +41,13 @@ class Backlash(SpringEffect):
         """One column."""
         torque, position = self.units_of(robot)
         return (Column(self.parameter_name(), f"{torque}/{position}", self.name, self.joint, self.side, True),)
+
+    def anchored(self, anchor: Anchor) -> "Backlash":
+        """With the cubic stiffness of the model."""
+        stiffness = anchor.value(f"{self.joint}.spring_stiffness")
+        if not stiffness > 0.0:
+            return self
+        return replace(self, cubic=max(anchor.value(f"{self.joint}.spring_stiffening") / stiffness, 0.0))
 
     def variants(self, state: State) -> tuple["Backlash", ...]:
         """Widths within the deflections of this motion, and between where it deflects to one side only."""
@@ -55,5 +65,7 @@ class Backlash(SpringEffect):
         return bool(0.4 * stiffness < values[0] < 2.5 * stiffness)
 
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """-clip(theta - q, -w, w)."""
-        return -np.clip(theta - q, -self.half_width, self.half_width)[:, None]
+        """-(c + r (d^3 - (d - c)^3))."""
+        d = theta - q
+        c = np.clip(d, -self.half_width, self.half_width)
+        return -(c + self.cubic * (d**3 - (d - c) ** 3))[:, None]

@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.assess import rivals, transfer
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.decide import decide, declared
+from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.search import Selection
@@ -83,6 +83,20 @@ def test_a_width_that_the_motion_leaves_open_is_no_reason_to_rule_play_out(prelo
     assert [a.effect for a in left[first]] == ["backlash"]
     width = left[first][0].fit.effects[first].half_width
     assert width < np.min(other.data.motion.deflection[:, 0]) * 1.5
+
+
+def test_of_equals_the_simplest_is_named(preloaded):
+    bench, _, selection = preloaded
+    first = len(selection.start.fit.effects)
+    fit = written_as(preloaded, SAME_TORQUE[1])
+    kinked = replace(selection, final=Settled(fit, selection.final.noise))
+    listed = {first: (Alternative("spring_offset", "hip", 1.0, selection.final.fit),), first + 1: ()}
+    chosen, left = simplest_first(bench, kinked, listed)
+    assert [e.name for e in chosen.effects] == ["spring_offset", "spring_offset"]
+    assert [(a.effect, a.joint) for a in left[first]] == [("asymmetric_spring", "hip")]
+    again, same = simplest_first(bench, chosen, left)
+    assert again is chosen
+    assert same == left
 
 
 def test_more_parameters_are_no_alternative_unless_another_motion_asks_for_them(preloaded):

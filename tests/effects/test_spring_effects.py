@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident.base_parameters import random_motion
-from sea_ident.effects import State, make_effect, spring_effects
+from sea_ident.effects import Anchor, State, make_effect, spring_effects
 from sea_ident.robot import load_robot, robot_from_text
 
 
@@ -64,3 +64,15 @@ def test_a_spring_of_two_straight_sides_pushes_back_on_both():
     spring = make_effect("asymmetric_spring", "knee", kink=0.01)
     assert spring.plausible(np.array([150.0]), {"knee.spring_stiffness": 200.0})
     assert not spring.plausible(np.array([-250.0]), {"knee.spring_stiffness": 200.0})
+
+
+def test_play_in_series_leaves_the_torque_of_the_whole_spring_at_what_is_beyond_it():
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=200, seed=4)
+    play = make_effect("backlash", "knee", half_width=0.01)
+    parameters = {"knee.spring_stiffness": 200.0, "knee.spring_stiffening": 8000.0}
+    play = play.anchored(Anchor(leg, (), parameters))
+    d = motion.deflection[:, 1]
+    beyond = d - np.clip(d, -0.01, 0.01)
+    torque = 200.0 * d + 8000.0 * d**3 + 200.0 * play.evaluate(State(leg, motion)).motor[:, 1, 0]
+    np.testing.assert_allclose(torque, 200.0 * beyond + 8000.0 * beyond**3, rtol=1e-9, atol=1e-12)
