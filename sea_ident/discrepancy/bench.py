@@ -8,13 +8,13 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import free_shapes, moved
-from sea_ident.discrepancy.linear import off, solve
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, signal_effects
+from sea_ident.discrepancy.linear import least_squares, off, solve, span
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
-from sea_ident.discrepancy.whitening import Whitening
-from sea_ident.effects import Effect
+from sea_ident.discrepancy.whitening import Parts, Whitening
+from sea_ident.effects import Effect, Side
 from sea_ident.regressor import prior_parameters
 
 MOST_FIT_STEPS = 10
@@ -88,7 +88,8 @@ class Bench(Tangents):
         unit = np.ones(len(self.data.equations))
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
-        return Fit(effects, columns, values, residual, unit, flat, np.zeros((len(flat), 0)), nothing, none, ())
+        empty = np.zeros((len(flat), 0))
+        return Fit(effects, columns, values, residual, unit, flat, empty, empty, nothing, none, ())
 
     def fit(
         self,
@@ -119,7 +120,7 @@ class Bench(Tangents):
         columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
         target = self._target if known is None else self._target - known
         parts = whitening.design(effects)
-        whole = self._whole(whitening) if known is None else whitening.in_parts(target)
+        whole = self._whole(whitening) if known is None else whitening.in_parts(target[:, :, None]) @ np.ones(1)
         slopes = self.stiffness_slopes(columns, design)
         values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
@@ -128,15 +129,17 @@ class Bench(Tangents):
             values = np.array([start.get(column.name, 0.0) for column in columns])
         scale = np.ones(len(self.data.equations))
         if noise is None:
-            values = values + solve(whitening.scaled(parts, scale), whitening.scaled(whole - parts @ values, scale))[0]
+            factors = whitening.factors(scale)
+            values = values + least_squares(parts.scaled(factors), factors @ (whole - parts @ values))
         else:
             values = self._descend(parts, whole, whitening, slopes, values)
             scale = self._link_scale(slopes @ values)
         left = whole - parts @ values
-        whitened = whitening.scaled(left, scale)
+        factors = whitening.factors(scale)
+        whitened = factors @ left
         residual = target - design @ values
         if noise is None:
-            directions, spectra = whitening.scaled(parts, scale), design
+            directions, spectra = parts.scaled(factors), design
         else:
             directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
             spectra = self.scaled(design, slopes, residual, scale, slopes @ values)
@@ -146,18 +149,17 @@ class Bench(Tangents):
             directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
             spectra = np.concatenate([spectra, bent], axis=2)
         _, basis, factor = solve(directions, whitened)
-        basis = np.concatenate([whitening.free, basis], axis=1)
-        return Fit(effects, columns, values, residual, scale, whitened, basis, spectra, factor, shapes)
+        return Fit(effects, columns, values, residual, scale, whitened, whitening.free, basis, spectra, factor, shapes)
 
     def _descend(
-        self, parts: FloatArray, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray
+        self, parts: Parts, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray
     ) -> FloatArray:
         """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness."""
         cost, best, step = np.inf, values, np.zeros(len(values))
         for _ in range(MOST_FIT_STEPS):
             left = whole - parts @ values
             scale = self._link_scale(slopes @ values)
-            whitened = whitening.scaled(left, scale)
+            whitened = whitening.factors(scale) @ left
             new_cost = float(whitened @ whitened)
             gone = len(self._scaled_links(slopes @ values)) < len(self._scaled_links(slopes @ best))
             if gone or not new_cost <= cost * (1.0 + 1e-9):
@@ -169,7 +171,7 @@ class Bench(Tangents):
             if converged:
                 break
             flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
-            step = solve(flat, whitened)[0]
+            step = least_squares(flat, whitened)
             values = values + step
         return best
 
@@ -201,7 +203,7 @@ class Bench(Tangents):
 
     def _flat_columns(
         self,
-        parts: FloatArray,
+        parts: Parts,
         left: FloatArray,
         whitening: Whitening,
         slopes: FloatArray,
@@ -209,10 +211,10 @@ class Bench(Tangents):
         stiffness: FloatArray,
     ) -> FloatArray:
         """(M, p) whitened decrease of the scaled residual with every parameter: `scaled`, in parts."""
-        out = whitening.scaled(parts, scale)
+        out = parts.scaled(whitening.factors(scale))
         for e in self._scaled_links(stiffness):
-            if np.any(slopes[e]):
-                out += scale[e] * np.outer(left[whitening.parts[e]], slopes[e] / stiffness[e])
+            for k in np.flatnonzero(slopes[e]):
+                out[:, k] += scale[e] * slopes[e, k] / stiffness[e] * left[whitening.parts[e]]
         return out
 
     def scaled(
@@ -232,14 +234,21 @@ class Bench(Tangents):
         """
         out = change * scale[:, None]
         for e in self._scaled_links(stiffness):
-            if np.any(slopes[e]):
-                out[:, e] += scale[e] * np.outer(residual[:, e], slopes[e] / stiffness[e])
+            stiffer = np.flatnonzero(slopes[e])
+            out[:, e, stiffer] += scale[e] * np.outer(residual[:, e], slopes[e, stiffer] / stiffness[e])
         return out
 
     def stiffness_of(self, fit: Fit) -> FloatArray:
         """(E,) slope of the springs of a fit over their deflection."""
-        slopes: FloatArray = self.stiffness_slopes(fit.columns, self.design(fit.effects)) @ fit.values
-        return slopes
+        counts, signals = self.counts(fit.effects), signal_effects(fit.effects)
+        begins = np.cumsum([0, *counts])
+        total = np.zeros(len(self.data.equations))
+        for effect, begin, count in zip(fit.effects, begins, counts, strict=False):
+            columns = fit.columns[begin : begin + count]
+            if any(column.side is Side.SPRING for column in columns):
+                slopes = self.stiffness_slopes(columns, self.columns_behind(effect, signals))
+                total += slopes @ fit.values[begin : begin + count]
+        return total
 
     @cached_property
     def first_fit(self) -> Fit:
@@ -258,7 +267,7 @@ class Bench(Tangents):
     def _whole(self, whitening: Whitening) -> FloatArray:
         """(G, M) target in parts."""
         if whitening.target is None:
-            whitening.target = whitening.in_parts(self._target)
+            whitening.target = whitening.in_parts(self._target[:, :, None]) @ np.ones(1)
         return whitening.target
 
     def free_basis(self, noise: NoiseFloor | None) -> FloatArray:
@@ -333,7 +342,7 @@ class Bench(Tangents):
         bent = self.tangents(fit.effects, fit.columns, fit.values, shapes)
         tangents = self.scaled(*bent, fit.residual, fit.scale, self.stiffness_of(fit))
         directions = self.whitening(noise).flat(tangents)
-        across = off(fit.basis, directions)
+        across = off(fit.basis, directions)  # the samples that are left out are out of them already
         strength = np.linalg.norm(across, axis=0)
         if not np.any(strength > 1e-9):
             return None
@@ -343,8 +352,7 @@ class Bench(Tangents):
         unit = across[:, seen] / strength[seen]
         normal = unit.T @ unit + np.diag(RIDGE + HELD / strength[seen] ** 2)
         step[seen] = np.clip(np.linalg.solve(normal, unit.T @ fit.whitened) / strength[seen], -1.0, 1.0)
-        rank = fit.covariance_factor.shape[1]
-        follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis[:, fit.basis.shape[1] - rank :].T @ directions)
+        follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis.T @ directions)
         for _ in range(5):
             effects = list(fit.effects)
             for (position, shape), amount in zip(shapes, step, strict=True):
@@ -380,7 +388,7 @@ class Bench(Tangents):
         noise = noise_from_periods(residuals)
         for _ in range(NOISE_ROUNDS):
             whitening = Whitening(self, noise.whitener(), self._free)
-            taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
+            taken = span(whitening.flat(fit.directions))
             noise = noise_beside_model(residuals, noise, np.concatenate([whitening.free, taken], axis=1))
         return noise
 

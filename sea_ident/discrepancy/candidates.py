@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.effects import Effect, Side, effect_classes
 from sea_ident.effects.drift import TrendEffect
@@ -87,15 +88,18 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
 
 
 def scan(bench: Bench, fit: Fit, noise: NoiseFloor, effects: Sequence[Effect] | None = None) -> list[Candidate]:
-    """How far every candidate would bring the statistic down, best first."""
+    """How far every candidate would bring the statistic down, best first, and of those that do the same the simplest.
+
+    On a motion that does not tell two effects apart, their gains differ by rounding alone.
+    """
     whitener = bench.whitener(noise)
-    left = fit.whitened - fit.basis @ (fit.basis.T @ fit.whitened)
+    left = fit.off(fit.whitened)
     found = []
     for effect in candidate_effects(bench, fit.effects) if effects is None else effects:
         candidate = examine(bench, fit, whitener, left, effect)
         if candidate is not None:
             found.append(candidate)
-    return sorted(found, key=lambda c: -c.gain)
+    return sorted(found, key=lambda c: (-float(f"{c.gain:.9g}"), penalty(c.effect, bench)))
 
 
 def examine(
@@ -138,7 +142,9 @@ def examine(
     norms = np.sqrt(np.sum(flat**2, axis=0))
     flat /= np.where(norms > 0.0, norms, 1.0)
     # single precision is plenty for a comparison of normalised columns, and half the work
-    shadow = (fit.basis.astype(np.float32).T @ flat.astype(np.float32)).astype(np.float64).reshape(-1, count, width)
+    short = flat.astype(np.float32)
+    shadow = np.concatenate([basis.T @ short for basis in (fit.free.astype(np.float32), fit.basis.astype(np.float32))])
+    shadow = shadow.astype(np.float64).reshape(-1, count, width)
     shaped = flat.reshape(len(flat), count, width)
     gram = np.einsum("mvk,mvl->vkl", shaped, shaped) - np.einsum("mvk,mvl->vkl", shadow, shadow)
     score = np.einsum("mvk,m->vk", shaped, left)
@@ -178,8 +184,7 @@ def _exactly(
     bench: Bench, fit: Fit, left: FloatArray, effect: Effect, columns: FloatArray, norms: FloatArray, tests: int
 ) -> Candidate:
     """A candidate with one shape, from its normalised whitened columns (M, k)."""
-    across = columns - fit.basis @ (fit.basis.T @ columns)
-    across -= fit.basis @ (fit.basis.T @ across)
+    across = fit.off(fit.off(columns))
     strength = np.sum(across**2, axis=0)
     across[:, strength <= ABSORBED] = 0.0
     size = np.where(norms > 0.0, norms, 1.0)

@@ -40,12 +40,15 @@ class Columns:
 
     def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect within a model."""
-        signals = signal_effects(effects)
+        return self.columns_behind(effect, signal_effects(effects))
+
+    def columns_behind(self, effect: Effect, signals: tuple[Effect, ...]) -> ComplexArray:
+        """(H + 1, E, k) columns of one effect behind the effects in the chain of signals of its model."""
         key = (effect, signals)
         if key not in self._columns:
             if len(self._columns) > 400:
                 self._columns.clear()
-            self._columns[key] = self._spectra(effect.evaluate(self.state(effects)), signals)
+            self._columns[key] = self._spectra(effect.evaluate(self.state(signals)), signals)
         return self._columns[key]
 
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
@@ -85,7 +88,8 @@ class Columns:
 
     def design(self, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, p) columns of a model."""
-        return np.concatenate([self.column_spectra(effect, effects) for effect in effects], axis=2)
+        signals = signal_effects(effects)
+        return np.concatenate([self.columns_behind(effect, signals) for effect in effects], axis=2)
 
     def labels(self, effects: Sequence[Effect]) -> tuple[Column, ...]:
         """(p,) labels of the columns of a model."""

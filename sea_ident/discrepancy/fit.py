@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.linear import off
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Effect, Shape
 
@@ -22,7 +23,8 @@ class Fit:
         residual: (H + 1, E) complex residual of the mean [N m].
         scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
-        basis: (M, r) orthonormal basis of everything that is free: columns, and tangents of the shapes.
+        free: (M, m) orthonormal basis of the samples that are left out.
+        basis: (M, r) orthonormal basis of all else that is free: columns, and tangents of the shapes.
         directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
         covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
@@ -34,6 +36,7 @@ class Fit:
     residual: ComplexArray
     scale: FloatArray
     whitened: FloatArray
+    free: FloatArray
     basis: FloatArray
     directions: ComplexArray
     covariance_factor: FloatArray
@@ -47,12 +50,16 @@ class Fit:
     @property
     def dof(self) -> int:
         """Degrees of freedom of the statistic."""
-        return int(len(self.whitened) - self.basis.shape[1])
+        return int(len(self.whitened) - self.free.shape[1] - self.basis.shape[1])
 
     @property
     def excess(self) -> float:
         """Part of the statistic beyond what noise leaves, at least zero."""
         return max(self.statistic - self.dof, 0.0)
+
+    def off(self, columns: FloatArray) -> FloatArray:
+        """Columns (M, ...) without what anything that is free could take up of them."""
+        return off(self.basis, off(self.free, columns))
 
     @cached_property
     def parameters(self) -> dict[str, float]:
