@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved, signal_effects
-from sea_ident.discrepancy.linear import least_squares, off, solve, span
+from sea_ident.discrepancy.linear import least_squares, off, span
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
@@ -84,12 +84,11 @@ class Bench(Tangents):
         effects, columns = tuple(effects), self.labels(effects)
         values = np.array([parameters.get(column.name, 0.0) for column in columns])
         residual = self._target - self.design(effects) @ values
-        none = np.zeros((len(values), 0))
         unit = np.ones(len(self.data.equations))
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
         empty = np.zeros((len(flat), 0))
-        return Fit(effects, columns, values, residual, unit, flat, empty, empty, nothing, none, ())
+        return Fit(effects, columns, values, residual, unit, flat, empty, empty, nothing, ())
 
     def fit(
         self,
@@ -148,8 +147,7 @@ class Bench(Tangents):
             bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, slopes @ values)
             directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
             spectra = np.concatenate([spectra, bent], axis=2)
-        _, basis, factor = solve(directions, whitened)
-        return Fit(effects, columns, values, residual, scale, whitened, whitening.free, basis, spectra, factor, shapes)
+        return Fit(effects, columns, values, residual, scale, whitened, whitening.free, directions, spectra, shapes)
 
     def _descend(
         self, parts: Parts, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sea_ident._typing import IntArray
-from sea_ident.discrepancy.data import PeriodData, spectrum
+from sea_ident.discrepancy.data import PeriodData, equation_row, spectrum
 from sea_ident.discrepancy.free_shapes import signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Anchor, Column, Contribution, Effect, State, corrected_motion
@@ -63,27 +63,31 @@ class Columns:
             if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
                 self._variants.clear()
             state = self.state(effects)
-            parts = [variant.evaluate(state) for variant in variants]
-            both = Contribution(np.stack([p.link for p in parts], 2), np.stack([p.motor for p in parts], 2))
-            self._variants[key] = self._touched(both, signals)
+            self._variants[key] = self._touched([variant.evaluate(state) for variant in variants], signals)
         return self._variants[key]
 
-    def _touched(self, part: Contribution, signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
-        """Equations with anything in them, and the spectra (H + 1, e, ...) there."""
+    def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
+        """Equations with anything in them, and the spectra (H + 1, e, v, ...) of all parts there."""
         for signal in signals:
-            part = signal.shifted(self.robot, self.data.motion.time, part)
-        rows = self.data.rows(part)
-        touched = np.array([e for e in range(rows.shape[1]) if np.any(rows[:, e])], dtype=np.intp)
-        return touched, spectrum(rows[:, touched], self.data.harmonics)
+            parts = [signal.shifted(self.robot, self.data.motion.time, part) for part in parts]
+        touched, found = [], []
+        for e, equation in enumerate(self.data.equations):
+            rows = [equation_row(equation, part) for part in parts]
+            if any(np.any(row) for row in rows):
+                touched.append(e)
+                found.append(np.stack(rows, axis=1))
+        shape = (self.data.samples, 0, len(parts), *parts[0].link.shape[2:])
+        every = np.stack(found, axis=1) if found else np.zeros(shape)
+        return np.array(touched, dtype=np.intp), spectrum(every, self.data.harmonics)
 
     def spectra_of(self, part: Contribution, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, ...) of link and motor rows (N, n, ...) within a model."""
         return self._spectra(part, signal_effects(effects))
 
     def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
-        touched, found = self._touched(part, signals)
-        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), *found.shape[2:]), dtype=np.complex128)
-        out[:, touched] = found
+        touched, found = self._touched([part], signals)
+        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), *found.shape[3:]), dtype=np.complex128)
+        out[:, touched] = found[:, :, 0]
         return out
 
     def design(self, effects: Sequence[Effect]) -> ComplexArray:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.linear import off
+from sea_ident.discrepancy.linear import off, solve
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Effect, Shape
 
@@ -24,9 +24,8 @@ class Fit:
         scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
         free: (M, m) orthonormal basis of the samples that are left out.
-        basis: (M, r) orthonormal basis of all else that is free: columns, and tangents of the shapes.
+        flat: (M, p + s) whitened `directions`, without the samples that are left out.
         directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
-        covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
     """
 
@@ -37,15 +36,29 @@ class Fit:
     scale: FloatArray
     whitened: FloatArray
     free: FloatArray
-    basis: FloatArray
+    flat: FloatArray
     directions: ComplexArray
-    covariance_factor: FloatArray
     free_shapes: tuple[tuple[int, Shape], ...]
 
     @property
     def statistic(self) -> float:
         """Weighted sum of squared residuals."""
         return float(self.whitened @ self.whitened)
+
+    @property
+    def basis(self) -> FloatArray:
+        """(M, r) orthonormal basis of what is free beside the samples left out: columns, and tangents of the shapes."""
+        return self._solved[0]
+
+    @property
+    def covariance_factor(self) -> FloatArray:
+        """(p + s, r) factor whose square is the covariance of parameters and shapes."""
+        return self._solved[1]
+
+    @cached_property
+    def _solved(self) -> tuple[FloatArray, FloatArray]:
+        # only for those that ask: most fits are trials of which nothing but the statistic is wanted
+        return solve(self.flat, self.whitened)[1:]
 
     @property
     def dof(self) -> int:

@@ -129,19 +129,21 @@ class Whitening:
         return int(self.parts.max()) + 1
 
     def _in_parts(self, columns: Sequence[ComplexArray]) -> list[Parts]:
-        blocks: list[list[Block]] = [[] for _ in columns]
+        places: list[tuple[int, int, int, int]] = []
+        flat: list[FloatArray] = []
         for part in range(self._count):
             own = np.flatnonzero(self.parts == part)
             spans = [_filled(values[:, own]) for values in columns]
             chosen = [values[:, own, begin:end] for values, (begin, end) in zip(columns, spans, strict=True)]
-            if not any(values.shape[2] for values in chosen):
-                continue
-            flat = off(self.free, whiten(self.whitener[:, :, own], np.concatenate(chosen, axis=2)))
-            rows, taken = np.ascontiguousarray(flat.T), 0
-            for found, (begin, end) in zip(blocks, spans, strict=True):
-                if end > begin:
-                    found.append(Block(part, begin, rows[taken : taken + end - begin]))
-                    taken += end - begin
+            if any(values.shape[2] for values in chosen):
+                flat.append(whiten(self.whitener[:, :, own], np.concatenate(chosen, axis=2)))
+                places.extend((k, part, begin, end) for k, (begin, end) in enumerate(spans) if end > begin)
+        blocks: list[list[Block]] = [[] for _ in columns]
+        if flat:
+            rows, taken = np.ascontiguousarray(off(self.free, np.concatenate(flat, axis=1)).T), 0
+            for k, part, begin, end in places:
+                blocks[k].append(Block(part, begin, rows[taken : taken + end - begin]))
+                taken += end - begin
         shapes = [(self._count, len(self.free), values.shape[2]) for values in columns]
         return [Parts(shape, tuple(found)) for shape, found in zip(shapes, blocks, strict=True)]
 
