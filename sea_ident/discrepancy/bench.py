@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved, signal_effects
-from sea_ident.discrepancy.linear import least_squares, off, span
+from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, span
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
@@ -129,9 +129,10 @@ class Bench(Tangents):
         scale = np.ones(len(self.data.equations))
         if noise is None:
             factors = whitening.factors(scale)
-            values = values + least_squares(parts.scaled(factors), factors @ (whole - parts @ values))
+            values = values + least_squares(parts.scaled(factors), factors @ (whole - parts @ values))[0]
+            frame = None
         else:
-            values = self._descend(parts, whole, whitening, slopes, values)
+            values, frame = self._descend(parts, whole, whitening, slopes, values)
             scale = self._link_scale(slopes @ values)
         left = whole - parts @ values
         factors = whitening.factors(scale)
@@ -147,13 +148,19 @@ class Bench(Tangents):
             bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, slopes @ values)
             directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
             spectra = np.concatenate([spectra, bent], axis=2)
-        return Fit(effects, columns, values, residual, scale, whitened, whitening.free, directions, spectra, shapes)
+            frame = None
+        free = whitening.free
+        return Fit(effects, columns, values, residual, scale, whitened, free, directions, spectra, shapes, frame)
 
     def _descend(
         self, parts: Parts, whole: FloatArray, whitening: Whitening, slopes: FloatArray, values: FloatArray
-    ) -> FloatArray:
-        """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness."""
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness.
+
+        And the frame (p, r) of the first step: between steps columns change by that scale alone.
+        """
         cost, best, step = np.inf, values, np.zeros(len(values))
+        frame: FloatArray | None = None
         for _ in range(MOST_FIT_STEPS):
             left = whole - parts @ values
             scale = self._link_scale(slopes @ values)
@@ -169,9 +176,12 @@ class Bench(Tangents):
             if converged:
                 break
             flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values)
-            step = least_squares(flat, whitened)
+            if frame is None:
+                step, frame = least_squares(flat, whitened)
+            else:
+                step = least_squares_near(frame, flat, whitened)
             values = values + step
-        return best
+        return best, frame
 
     def _link_scale(self, stiffness: FloatArray) -> FloatArray:
         """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.linear import off, solve
+from sea_ident.discrepancy.linear import off, solve, solve_near
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Effect, Shape
 
@@ -27,6 +27,7 @@ class Fit:
         flat: (M, p + s) whitened `directions`, without the samples that are left out.
         directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
+        frame: (p, r) what makes `flat` nearly orthonormal, where no shape is free and it is known.
     """
 
     effects: tuple[Effect, ...]
@@ -39,6 +40,7 @@ class Fit:
     flat: FloatArray
     directions: ComplexArray
     free_shapes: tuple[tuple[int, Shape], ...]
+    frame: FloatArray | None = None
 
     @property
     def statistic(self) -> float:
@@ -58,7 +60,7 @@ class Fit:
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray]:
         # only for those that ask: most fits are trials of which nothing but the statistic is wanted
-        return solve(self.flat, self.whitened)[1:]
+        return solve(self.flat, self.whitened)[1:] if self.frame is None else solve_near(self.frame, self.flat)
 
     @property
     def dof(self) -> int:
