@@ -8,13 +8,13 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit, Known
-from sea_ident.discrepancy.free_shapes import free_shapes, moved
-from sea_ident.discrepancy.linear import off, solve
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, signal_effects
+from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, span
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
-from sea_ident.discrepancy.whitening import Whitening
-from sea_ident.effects import Effect
+from sea_ident.discrepancy.whitening import Parts, Whitening
+from sea_ident.effects import Effect, Side
 from sea_ident.regressor import prior_parameters
 
 MOST_FIT_STEPS = 10
@@ -85,11 +85,11 @@ class Bench(Tangents):
         values = np.array([parameters.get(column.name, 0.0) for column in columns])
         design = self.design(effects)
         residual = self._target - design @ values
-        none = np.zeros((len(values), 0))
         scale = self._link_scale(self.stiffness_slopes(columns, design, effects) @ values)
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
-        return Fit(effects, columns, values, residual, scale, flat, np.zeros((len(flat), 0)), nothing, none, ())
+        empty = np.zeros((len(flat), 0))
+        return Fit(effects, columns, values, residual, scale, flat, empty, empty, nothing, ())
 
     def fit(
         self,
@@ -121,7 +121,7 @@ class Bench(Tangents):
         target = self._target if known is None else self._target - known.torque
         beside = np.zeros(len(self.data.equations)) if known is None else known.stiffness
         parts = whitening.design(effects)
-        whole = self._whole(whitening) if known is None else whitening.in_parts(target)
+        whole = self._whole(whitening) if known is None else whitening.in_parts(target[:, :, None]) @ np.ones(1)
         slopes = self.stiffness_slopes(columns, design, effects)
         values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
@@ -130,15 +130,18 @@ class Bench(Tangents):
             values = np.array([start.get(column.name, 0.0) for column in columns])
         scale = np.ones(len(self.data.equations))
         if noise is None:
-            values = values + solve(whitening.scaled(parts, scale), whitening.scaled(whole - parts @ values, scale))[0]
+            factors = whitening.factors(scale)
+            values = values + least_squares(parts.scaled(factors), factors @ (whole - parts @ values))[0]
+            frame = None
         else:
-            values = self._descend(parts, whole, whitening, slopes, beside, values)
+            values, frame = self._descend(parts, whole, whitening, slopes, beside, values)
             scale = self._link_scale(slopes @ values + beside)
         left = whole - parts @ values
-        whitened = whitening.scaled(left, scale)
+        factors = whitening.factors(scale)
+        whitened = factors @ left
         residual = target - design @ values
         if noise is None:
-            directions, spectra = whitening.scaled(parts, scale), design
+            directions, spectra = parts.scaled(factors), design
         else:
             directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
             spectra = self.scaled(design, slopes, residual, scale, slopes @ values + beside)
@@ -148,25 +151,29 @@ class Bench(Tangents):
             bent = self.scaled(*tangent, residual, scale, slopes @ values + beside)
             directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
             spectra = np.concatenate([spectra, bent], axis=2)
-        _, basis, factor = solve(directions, whitened)
-        basis = np.concatenate([whitening.free, basis], axis=1)
-        return Fit(effects, columns, values, residual, scale, whitened, basis, spectra, factor, shapes)
+            frame = None
+        free = whitening.free
+        return Fit(effects, columns, values, residual, scale, whitened, free, directions, spectra, shapes, frame)
 
     def _descend(
         self,
-        parts: FloatArray,
+        parts: Parts,
         whole: FloatArray,
         whitening: Whitening,
         slopes: FloatArray,
         beside: FloatArray,
         values: FloatArray,
-    ) -> FloatArray:
-        """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness."""
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness.
+
+        And the frame (p, r) of the first step: between steps columns change by that scale alone.
+        """
         cost, best, step = np.inf, values, np.zeros(len(values))
+        frame: FloatArray | None = None
         for _ in range(MOST_FIT_STEPS):
             left = whole - parts @ values
             scale = self._link_scale(slopes @ values + beside)
-            whitened = whitening.scaled(left, scale)
+            whitened = whitening.factors(scale) @ left
             new_cost = float(whitened @ whitened)
             tight, before = (self._scaled_links(slopes @ each + beside) for each in (values, best))
             gone = len(tight) < len(before)
@@ -179,9 +186,12 @@ class Bench(Tangents):
             if converged:
                 break
             flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
-            step = solve(flat, whitened)[0]
+            if frame is None:
+                step, frame = least_squares(flat, whitened)
+            else:
+                step = least_squares_near(frame, flat, whitened)
             values = values + step
-        return best
+        return best, frame
 
     def _link_scale(self, stiffness: FloatArray) -> FloatArray:
         """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
@@ -211,7 +221,7 @@ class Bench(Tangents):
 
     def _flat_columns(
         self,
-        parts: FloatArray,
+        parts: Parts,
         left: FloatArray,
         whitening: Whitening,
         slopes: FloatArray,
@@ -219,10 +229,10 @@ class Bench(Tangents):
         stiffness: FloatArray,
     ) -> FloatArray:
         """(M, p) whitened decrease of the scaled residual with every parameter: `scaled`, in parts."""
-        out = whitening.scaled(parts, scale)
+        out = parts.scaled(whitening.factors(scale))
         for e in self._scaled_links(stiffness):
-            if np.any(slopes[e]):
-                out += scale[e] * np.outer(left[whitening.parts[e]], slopes[e] / stiffness[e])
+            for k in np.flatnonzero(slopes[e]):
+                out[:, k] += scale[e] * slopes[e, k] / stiffness[e] * left[whitening.parts[e]]
         return out
 
     def scaled(
@@ -242,15 +252,21 @@ class Bench(Tangents):
         """
         out = change * scale[:, None]
         for e in self._scaled_links(stiffness):
-            if np.any(slopes[e]):
-                out[:, e] += scale[e] * np.outer(residual[:, e], slopes[e] / stiffness[e])
+            stiffer = np.flatnonzero(slopes[e])
+            out[:, e, stiffer] += scale[e] * np.outer(residual[:, e], slopes[e, stiffer] / stiffness[e])
         return out
 
     def stiffness_of(self, fit: Fit) -> FloatArray:
         """(E,) slope of the springs of a fit over their deflection."""
-        design = self.design(fit.effects)
-        slopes: FloatArray = self.stiffness_slopes(fit.columns, design, fit.effects) @ fit.values
-        return slopes
+        counts, signals = self.counts(fit.effects), signal_effects(fit.effects)
+        begins = np.cumsum([0, *counts])
+        total = np.zeros(len(self.data.equations))
+        for effect, begin, count in zip(fit.effects, begins, counts, strict=False):
+            columns = fit.columns[begin : begin + count]
+            if any(column.side is Side.SPRING for column in columns):
+                slopes = self.stiffness_slopes(columns, self.columns_behind(effect, signals), fit.effects)
+                total += slopes @ fit.values[begin : begin + count]
+        return total
 
     @cached_property
     def first_fit(self) -> Fit:
@@ -269,7 +285,7 @@ class Bench(Tangents):
     def _whole(self, whitening: Whitening) -> FloatArray:
         """(G, M) target in parts."""
         if whitening.target is None:
-            whitening.target = whitening.in_parts(self._target)
+            whitening.target = whitening.in_parts(self._target[:, :, None]) @ np.ones(1)
         return whitening.target
 
     def free_basis(self, noise: NoiseFloor | None) -> FloatArray:
@@ -344,7 +360,7 @@ class Bench(Tangents):
         bent = self.tangents(fit.effects, fit.columns, fit.values, shapes)
         tangents = self.scaled(*bent, fit.residual, fit.scale, self.stiffness_of(fit))
         directions = self.whitening(noise).flat(tangents)
-        across = off(fit.basis, directions)
+        across = off(fit.basis, directions)  # the samples that are left out are out of them already
         strength = np.linalg.norm(across, axis=0)
         if not np.any(strength > 1e-9):
             return None
@@ -354,8 +370,7 @@ class Bench(Tangents):
         unit = across[:, seen] / strength[seen]
         normal = unit.T @ unit + np.diag(RIDGE + HELD / strength[seen] ** 2)
         step[seen] = np.clip(np.linalg.solve(normal, unit.T @ fit.whitened) / strength[seen], -1.0, 1.0)
-        rank = fit.covariance_factor.shape[1]
-        follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis[:, fit.basis.shape[1] - rank :].T @ directions)
+        follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis.T @ directions)
         for _ in range(5):
             effects = list(fit.effects)
             for (position, shape), amount in zip(shapes, step, strict=True):
@@ -391,7 +406,7 @@ class Bench(Tangents):
         noise = noise_from_periods(residuals)
         for _ in range(NOISE_ROUNDS):
             whitening = Whitening(self, noise.whitener(), self._free)
-            taken = solve(whitening.flat(fit.directions), np.zeros(len(whitening.free)))[1]
+            taken = span(whitening.flat(fit.directions))
             noise = noise_beside_model(residuals, noise, np.concatenate([whitening.free, taken], axis=1))
         return noise
 

@@ -1,6 +1,6 @@
 """Candidates: every effect of the library at every place that the model does not have yet."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,9 @@ from scipy.optimize import lsq_linear
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.noise import NoiseFloor, stacked
+from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.linear import whiten
+from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Side, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
@@ -28,6 +30,9 @@ FEW_SHAPES = 24
 
 LARGEST_OF_MANY = 0.5
 """Torque of a shape, as a share of the torque of the motor, beyond which another shape is taken where there is one."""
+
+COLUMNS_AT_ONCE = 200
+"""Columns of candidates that are compared with the model at a time, or a few more."""
 
 ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
@@ -90,26 +95,81 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
 
 
 def scan(bench: Bench, fit: Fit, noise: NoiseFloor, effects: Sequence[Effect] | None = None) -> list[Candidate]:
-    """How far every candidate would bring the statistic down, best first."""
-    whitener = bench.whitener(noise)
-    left = fit.whitened - fit.basis @ (fit.basis.T @ fit.whitened)
-    found = []
-    for effect in candidate_effects(bench, fit.effects) if effects is None else effects:
-        candidate = examine(bench, fit, whitener, left, effect)
-        if candidate is not None:
-            found.append(candidate)
-    return sorted(found, key=lambda c: -c.gain)
+    """How far every candidate would bring the statistic down, best first, and of those that do the same the simplest.
+
+    On a motion that does not tell two effects apart, their gains differ by rounding alone.
+    """
+    left = fit.off(fit.whitened)
+    # single precision is plenty for a comparison of normalised columns, and half the work
+    model = _Model(fit, bench.whitener(noise), left, np.concatenate([fit.free, fit.basis], axis=1).astype(np.float32))
+    effects = candidate_effects(bench, fit.effects) if effects is None else effects
+    tried = [shown for effect in effects if (shown := _promising(bench, model, effect)) is not None]
+    found: list[Candidate] = []
+    for some in _chunks(tried):
+        # all together, for the basis is much larger than the columns of one
+        columns = np.concatenate([columns for each in some for columns in each.columns], axis=1)
+        across = fit.off(fit.off(columns))
+        begin = 0
+        for each in some:
+            best: Candidate | None = None
+            for effect, norms in zip(each.variants, each.norms, strict=True):
+                own = across[:, begin : begin + len(norms)].copy()
+                begin += len(norms)
+                candidate = _exactly(bench, fit, left, effect, own, norms, each.tests)
+                if best is None or candidate.gain > best.gain:
+                    best = candidate
+            if best is not None:
+                found.append(replace(best, effect=_with_smoothing_of(each.effect, best.effect)))
+    return sorted(found, key=lambda c: (-float(f"{c.gain:.9g}"), penalty(c.effect, bench)))
 
 
-def examine(
-    bench: Bench,
-    fit: Fit,
-    whitener: NDArray[np.complex128],
-    left: FloatArray,
-    effect: Effect,
-) -> Candidate | None:
-    """One candidate with its best shape, None where it cannot act on this robot or in this motion."""
-    slopes: FloatArray
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """What candidates are held against: a fit, its whitener, what it leaves (M,), all that is free (M, r)."""
+
+    fit: Fit
+    whitener: NDArray[np.complex128]
+    left: FloatArray
+    basis: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class _Promising:
+    """The most promising shapes of an effect.
+
+    Attributes:
+        effect: anchored in the model.
+        variants: the effect with each of these shapes.
+        columns: of each, whitened and normalised (M, k).
+        norms: (k,) of each.
+        tests: number of shapes looked at.
+    """
+
+    effect: Effect
+    variants: tuple[Effect, ...]
+    columns: tuple[FloatArray, ...]
+    norms: tuple[FloatArray, ...]
+    tests: int
+
+
+def _chunks(tried: Sequence[_Promising]) -> Iterator[list[_Promising]]:
+    """The same in portions of not many more than `COLUMNS_AT_ONCE` columns."""
+    portion: list[_Promising] = []
+    width = 0
+    for each in tried:
+        portion.append(each)
+        width += sum(len(norms) for norms in each.norms)
+        if width >= COLUMNS_AT_ONCE:
+            yield portion
+            portion, width = [], 0
+    if portion:
+        yield portion
+
+
+def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None:
+    """The shapes of an effect worth a closer look, None where it cannot act on this robot or in this motion."""
+    fit, left = model.fit, model.left
+    slopes = np.zeros((len(fit.scale), 0))
     try:
         anchored = bench.anchored((*fit.effects, effect), fit.parameters)[-1]
         if isinstance(anchored, SignalEffect):
@@ -121,27 +181,28 @@ def examine(
         else:
             variants = _coarse(anchored).variants(bench.state(fit.effects))
             touched, spectra = bench.variant_spectra(variants, fit.effects)
-            slopes = np.zeros((len(touched), 0))
     except EffectError:
         return None
     harmonics, equations, count, width = spectra.shape
     if width == 0 or not np.any(spectra):
         return None
-    whole = np.zeros((harmonics, len(fit.scale), count * width), dtype=np.complex128)
-    whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
-    if anchored.side is Side.SPRING and not isinstance(anchored, SignalEffect):
-        slopes = bench.slopes_of(whole, bench.links_of(anchored), fit.effects)
-    if np.any(slopes):
-        scaled = bench.scaled(whole, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))
+    if anchored.side is Side.SPRING or slopes.size:
+        whole = np.zeros((harmonics, len(fit.scale), count * width), dtype=np.complex128)
+        whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
+        slopes = slopes if slopes.size else bench.slopes_of(whole, bench.links_of(anchored), fit.effects)
+        if np.any(slopes):
+            whole = bench.scaled(whole, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))
+        else:
+            whole *= fit.scale[:, None]
+        # what makes a spring stiffer changes the scale of the residual of its link, wherever else it acts
+        changed = np.union1d(touched, np.flatnonzero(np.any(slopes != 0.0, axis=1)))
+        flat = whiten(model.whitener[:, :, changed], whole[:, changed])
     else:
-        scaled = np.asarray(whole * fit.scale[:, None], dtype=np.complex128)
-        slopes = np.zeros((len(fit.scale), count * width))
-    touched = np.union1d(touched, np.flatnonzero(np.any(slopes != 0.0, axis=1)))
-    flat = stacked(np.matmul(whitener[:, :, touched], scaled[:, touched]))
+        scaled = spectra.reshape(harmonics, equations, count * width) * fit.scale[touched, None]
+        flat = whiten(model.whitener[:, :, touched], scaled)
     norms = np.sqrt(np.sum(flat**2, axis=0))
     flat /= np.where(norms > 0.0, norms, 1.0)
-    # single precision is plenty for a comparison of normalised columns, and half the work
-    shadow = (fit.basis.astype(np.float32).T @ flat.astype(np.float32)).astype(np.float64).reshape(-1, count, width)
+    shadow = (model.basis.T @ flat.astype(np.float32)).astype(np.float64).reshape(-1, count, width)
     shaped = flat.reshape(len(flat), count, width)
     gram = np.einsum("mvk,mvl->vkl", shaped, shaped) - np.einsum("mvk,mvl->vkl", shadow, shadow)
     score = np.einsum("mvk,m->vk", shaped, left)
@@ -157,7 +218,7 @@ def examine(
     allowed = np.array([_allowed(bench, fit, variant, value) for variant, value in zip(variants, values, strict=True)])
     if count > 1 and not _bounded(bench, anchored):
         # a wave that is much longer than the path bends like what is there already, and is as large as you like
-        own = np.einsum("hevk,vk->hev", whole.reshape(harmonics, -1, count, width)[:, touched], values)
+        own = np.einsum("hevk,vk->hev", spectra, values)
         sizes = np.sqrt(np.sum(np.abs(own) ** 2, axis=0)) / np.maximum(bench.torque_rms[touched, None], 1e-300)
         modest = np.max(sizes, axis=0, initial=0.0) <= LARGEST_OF_MANY
         if np.any(allowed & modest):
@@ -167,22 +228,19 @@ def examine(
     tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
     if width > 1:
         tries |= {int(v) for v in np.argsort(gains)[-2:]}
-    best: Candidate | None = None
-    for v in tries:
-        found = _exactly(bench, fit, left, variants[v], shaped[:, v], norms.reshape(count, width)[v], count)
-        if best is None or found.gain > best.gain:
-            best = found
-    if best is None:
-        return None
-    return replace(best, effect=_with_smoothing_of(anchored, best.effect))
+    return _Promising(
+        effect=anchored,
+        variants=tuple(variants[v] for v in tries),
+        columns=tuple(shaped[:, v].copy() for v in tries),
+        norms=tuple(norms.reshape(count, width)[v] for v in tries),
+        tests=count,
+    )
 
 
 def _exactly(
-    bench: Bench, fit: Fit, left: FloatArray, effect: Effect, columns: FloatArray, norms: FloatArray, tests: int
+    bench: Bench, fit: Fit, left: FloatArray, effect: Effect, across: FloatArray, norms: FloatArray, tests: int
 ) -> Candidate:
-    """A candidate with one shape, from its normalised whitened columns (M, k)."""
-    across = columns - fit.basis @ (fit.basis.T @ columns)
-    across -= fit.basis @ (fit.basis.T @ across)
+    """A candidate with one shape, from its normalised whitened columns (M, k) across all that is free."""
     strength = np.sum(across**2, axis=0)
     across[:, strength <= ABSORBED] = 0.0
     size = np.where(norms > 0.0, norms, 1.0)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sea_ident._typing import IntArray
-from sea_ident.discrepancy.data import PeriodData, spectrum
+from sea_ident.discrepancy.data import PeriodData, equation_row, spectrum
 from sea_ident.discrepancy.free_shapes import signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Anchor, Column, Contribution, Effect, State, corrected_motion
@@ -40,12 +40,15 @@ class Columns:
 
     def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect within a model."""
-        signals = signal_effects(effects)
+        return self.columns_behind(effect, signal_effects(effects))
+
+    def columns_behind(self, effect: Effect, signals: tuple[Effect, ...]) -> ComplexArray:
+        """(H + 1, E, k) columns of one effect behind the effects in the chain of signals of its model."""
         key = (effect, signals)
         if key not in self._columns:
             if len(self._columns) > 400:
                 self._columns.clear()
-            self._columns[key] = self._spectra(effect.evaluate(self.state(effects)), signals)
+            self._columns[key] = self._spectra(effect.evaluate(self.state(signals)), signals)
         return self._columns[key]
 
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
@@ -60,32 +63,37 @@ class Columns:
             if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
                 self._variants.clear()
             state = self.state(effects)
-            parts = [variant.evaluate(state) for variant in variants]
-            both = Contribution(np.stack([p.link for p in parts], 2), np.stack([p.motor for p in parts], 2))
-            self._variants[key] = self._touched(both, signals)
+            self._variants[key] = self._touched([variant.evaluate(state) for variant in variants], signals)
         return self._variants[key]
 
-    def _touched(self, part: Contribution, signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
-        """Equations with anything in them, and the spectra (H + 1, e, ...) there."""
+    def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
+        """Equations with anything in them, and the spectra (H + 1, e, v, ...) of all parts there."""
         for signal in signals:
-            part = signal.shifted(self.robot, self.data.motion.time, part)
-        rows = self.data.rows(part)
-        touched = np.array([e for e in range(rows.shape[1]) if np.any(rows[:, e])], dtype=np.intp)
-        return touched, spectrum(rows[:, touched], self.data.harmonics)
+            parts = [signal.shifted(self.robot, self.data.motion.time, part) for part in parts]
+        touched, found = [], []
+        for e, equation in enumerate(self.data.equations):
+            rows = [equation_row(equation, part) for part in parts]
+            if any(np.any(row) for row in rows):
+                touched.append(e)
+                found.append(np.stack(rows, axis=1))
+        shape = (self.data.samples, 0, len(parts), *parts[0].link.shape[2:])
+        every = np.stack(found, axis=1) if found else np.zeros(shape)
+        return np.array(touched, dtype=np.intp), spectrum(every, self.data.harmonics)
 
     def spectra_of(self, part: Contribution, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, ...) of link and motor rows (N, n, ...) within a model."""
         return self._spectra(part, signal_effects(effects))
 
     def _spectra(self, part: Contribution, signals: tuple[Effect, ...]) -> ComplexArray:
-        touched, found = self._touched(part, signals)
-        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), *found.shape[2:]), dtype=np.complex128)
-        out[:, touched] = found
+        touched, found = self._touched([part], signals)
+        out = np.zeros((self.data.harmonics + 1, len(self.data.equations), *found.shape[3:]), dtype=np.complex128)
+        out[:, touched] = found[:, :, 0]
         return out
 
     def design(self, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, p) columns of a model."""
-        return np.concatenate([self.column_spectra(effect, effects) for effect in effects], axis=2)
+        signals = signal_effects(effects)
+        return np.concatenate([self.columns_behind(effect, signals) for effect in effects], axis=2)
 
     def labels(self, effects: Sequence[Effect]) -> tuple[Column, ...]:
         """(p,) labels of the columns of a model."""

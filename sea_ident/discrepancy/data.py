@@ -154,15 +154,16 @@ def towards_mean(motions: Sequence[Motion], share: float) -> tuple[Motion, tuple
 
 def equation_rows(equations: tuple[Equation, ...], part: Contribution) -> FloatArray:
     """(N, E, ...) rows of the equations from link and motor rows (N, n, ...)."""
-    rows = [
-        part.motor[:, eq.index]
-        if eq.kind is EquationKind.MOTOR
-        else part.link[:, eq.index]
-        if eq.kind is EquationKind.LINK
-        else part.link[:, eq.index] + part.motor[:, eq.index]
-        for eq in equations
-    ]
-    return np.stack(rows, axis=1)
+    return np.stack([equation_row(equation, part) for equation in equations], axis=1)
+
+
+def equation_row(equation: Equation, part: Contribution) -> FloatArray:
+    """(N, ...) rows of one equation from link and motor rows (N, n, ...)."""
+    if equation.kind is EquationKind.MOTOR:
+        return part.motor[:, equation.index]
+    if equation.kind is EquationKind.LINK:
+        return part.link[:, equation.index]
+    return part.link[:, equation.index] + part.motor[:, equation.index]
 
 
 def equations_of(robot: Robot) -> tuple[Equation, ...]:

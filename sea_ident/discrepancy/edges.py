@@ -7,7 +7,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects.external_force import ExternalForce
 
@@ -76,7 +76,7 @@ def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, strid
     interval = period / samples
     others = [e for k, e in enumerate(fit.effects) if k != position]
     rest = bench.fit(others, noise, start=fit.parameters)
-    left = off(rest.basis, rest.whitened)
+    left = rest.off(rest.whitened)
     ends = np.arange(stride, samples + 1, stride)
     begun = [replace(push, start=0.0, stop=float(end - 1) * interval, period=period) for end in ends]  # type: ignore[call-arg]
     touched, spectra = bench.variant_spectra(begun, others)
@@ -84,7 +84,7 @@ def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, strid
     whole = np.zeros((harmonics, len(rest.scale), count * width), dtype=np.complex128)
     whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
     scaled = np.asarray(whole * rest.scale[:, None], dtype=np.complex128)
-    columns = off(rest.basis, whiten(bench.whitener(noise), scaled)).reshape(-1, count, width)
+    columns = rest.off(whiten(bench.whitener(noise), scaled)).reshape(-1, count, width)
     # nothing pushes before the first instant
     columns = np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
     gains = _window_gains(columns, left)

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.linear import off, solve, solve_near
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Effect, Shape
 
@@ -22,10 +23,11 @@ class Fit:
         residual: (H + 1, E) complex residual of the mean [N m].
         scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
-        basis: (M, r) orthonormal basis of everything that is free: columns, and tangents of the shapes.
+        free: (M, m) orthonormal basis of the samples that are left out.
+        flat: (M, p + s) whitened `directions`, without the samples that are left out.
         directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
-        covariance_factor: (p + s, r) factor whose square is the covariance of parameters and shapes.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
+        frame: (p, r) what makes `flat` nearly orthonormal, where no shape is free and it is known.
     """
 
     effects: tuple[Effect, ...]
@@ -34,10 +36,11 @@ class Fit:
     residual: ComplexArray
     scale: FloatArray
     whitened: FloatArray
-    basis: FloatArray
+    free: FloatArray
+    flat: FloatArray
     directions: ComplexArray
-    covariance_factor: FloatArray
     free_shapes: tuple[tuple[int, Shape], ...]
+    frame: FloatArray | None = None
 
     @property
     def statistic(self) -> float:
@@ -45,14 +48,33 @@ class Fit:
         return float(self.whitened @ self.whitened)
 
     @property
+    def basis(self) -> FloatArray:
+        """(M, r) orthonormal basis of what is free beside the samples left out: columns, and tangents of the shapes."""
+        return self._solved[0]
+
+    @property
+    def covariance_factor(self) -> FloatArray:
+        """(p + s, r) factor whose square is the covariance of parameters and shapes."""
+        return self._solved[1]
+
+    @cached_property
+    def _solved(self) -> tuple[FloatArray, FloatArray]:
+        # only for those that ask: most fits are trials of which nothing but the statistic is wanted
+        return solve(self.flat, self.whitened)[1:] if self.frame is None else solve_near(self.frame, self.flat)
+
+    @property
     def dof(self) -> int:
         """Degrees of freedom of the statistic."""
-        return int(len(self.whitened) - self.basis.shape[1])
+        return int(len(self.whitened) - self.free.shape[1] - self.basis.shape[1])
 
     @property
     def excess(self) -> float:
         """Part of the statistic beyond what noise leaves, at least zero."""
         return max(self.statistic - self.dof, 0.0)
+
+    def off(self, columns: FloatArray) -> FloatArray:
+        """Columns (M, ...) without what anything that is free could take up of them."""
+        return off(self.basis, off(self.free, columns))
 
     @cached_property
     def parameters(self) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -18,7 +19,12 @@ SHAPES_THAT_STAY = {
 
 def is_signal(effect: Effect) -> bool:
     """Whether an effect sits in the chain of signals."""
-    return isinstance(effect, SignalEffect)
+    return _is_signal_kind(type(effect))
+
+
+@cache
+def _is_signal_kind(kind: type[Effect]) -> bool:
+    return issubclass(kind, SignalEffect)
 
 
 def signal_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -30,7 +30,7 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
     statistic, dof = settled.fit.statistic, settled.fit.dof
     periods = flat_periods(bench, settled)
     basis = settled.fit.basis
-    periods = periods - (periods @ basis) @ basis.T
+    periods = periods - (periods @ basis) @ basis.T  # the samples that are left out are out of them already
     directions = min(noise_directions(periods), float(dof))
     freedom = directions * step_freedom(bench.data.periods)
     return statistic, dof, float(stats.f.sf(statistic / max(dof, 1), directions, freedom))

@@ -20,6 +20,9 @@ from sea_ident.motion import Motion
 SIGNALS_KEPT = 12
 """Errors of the encoders of which the deflections are kept."""
 
+LONGEST_LEVER = 10.0
+"""Distance of a centre of mass from its joint up to which it is as good as any to compute with [m]."""
+
 
 class Tangents(Columns):
     """Derivatives with respect to shapes and to amounts of effects in the chain of signals.
@@ -202,8 +205,8 @@ class Tangents(Columns):
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Derivatives (N, nv, nv) of the torque of bodies and rotors with position, velocity, acceleration.
 
-        The torque is linear in the inertial parameters. A unit mass is put on every body and its own derivative taken
-        off again, so that a body without mass may have a first moment.
+        The torque is linear in the inertial parameters. Where a body has a first moment without a mass, which is no
+        lever, a mass is put on every body and its own derivative taken off again.
         """
         robot = self.robot
         inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
@@ -211,18 +214,25 @@ class Tangents(Columns):
         key = (tuple(inertial), tuple(rotors), id(state))
         if self._derivatives is not None and self._derivatives[0] == key:
             return self._derivatives[1]
-        unit = np.zeros_like(inertial)
-        unit[::10] = 1.0
-        offset = 1.0 + 10.0 * float(np.max(np.abs(inertial), initial=0.0))
-        spare = float(np.max(np.abs(rotors), initial=1e-6))  # keeps a rotor with a negative estimate positive
-        whole = robot.with_inertial_parameters(inertial + offset * unit, rotors + 2.0 * spare)
-        alone = robot.with_inertial_parameters(offset * unit, np.full_like(rotors, 2.0 * spare))
+        bodies = inertial.reshape(-1, 10)
+        moments = np.linalg.norm(bodies[:, 1:4], axis=1)
+        if np.all(rotors > 0.0) and np.all(np.abs(bodies[:, 0]) > moments / LONGEST_LEVER):
+            models = [robot.with_inertial_parameters(inertial, rotors)]
+        else:
+            unit = np.zeros_like(inertial)
+            unit[::10] = 1.0
+            offset = 1.0 + 10.0 * float(np.max(np.abs(inertial), initial=0.0))
+            spare = float(np.max(np.abs(rotors), initial=1e-6))  # keeps a rotor with a negative estimate positive
+            models = [
+                robot.with_inertial_parameters(inertial + offset * unit, rotors + 2.0 * spare),
+                robot.with_inertial_parameters(offset * unit, np.full_like(rotors, 2.0 * spare)),
+            ]
         motion = state.motion
         x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
         v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
         a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))
         out = []
-        for part in (whole, alone):
+        for part in models:
             model = part.extended_model
             data = model.createData()
             size = model.nv
@@ -234,7 +244,7 @@ class Tangents(Columns):
             upper = np.triu(parts[2])
             parts[2] = upper + np.triu(upper, 1).transpose(0, 2, 1)
             out.append(parts)
-        change = out[0] - out[1]
+        change = out[0] if len(out) == 1 else out[0] - out[1]
         self._derivatives = (key, (change[0], change[1], change[2]))
         return self._derivatives[1]
 

@@ -5,6 +5,7 @@ columns are kept in parts, one for all equations that are never scaled and one f
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,12 +13,56 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.columns import Columns
 from sea_ident.discrepancy.data import EquationKind
 from sea_ident.discrepancy.free_shapes import signal_effects
-from sea_ident.discrepancy.linear import off, solve, whiten
+from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Effect
 
 PARTS_KEPT = 2e8
 """Bytes of columns that are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Neighbouring columns of one part.
+
+    Attributes:
+        part: which.
+        first: position of the first column.
+        rows: (k, M) the columns, each a row of memory: sums and factorisations go along columns.
+    """
+
+    part: int
+    first: int
+    rows: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Whitened columns in parts that add up; most columns are in one or two of them.
+
+    Attributes:
+        shape: (G, M, p) parts, rows, columns.
+        blocks: what is not zero.
+    """
+
+    shape: tuple[int, int, int]
+    blocks: tuple[Block, ...]
+
+    def scaled(self, factors: FloatArray) -> FloatArray:
+        """(M, p) sum of the parts, each times its factor (G,)."""
+        out = np.zeros((self.shape[2], self.shape[1]))
+        for block in self.blocks:
+            factor = factors[block.part]
+            own = out[block.first : block.first + len(block.rows)]
+            own += block.rows if factor == 1.0 else factor * block.rows
+        return out.T
+
+    def __matmul__(self, values: FloatArray) -> FloatArray:
+        """(G, M) torque of every part with parameters (p,)."""
+        out = np.zeros(self.shape[:2])
+        for block in self.blocks:
+            out[block.part] += values[block.first : block.first + len(block.rows)] @ block.rows
+        return out
 
 
 class Whitening:
@@ -37,46 +82,73 @@ class Whitening:
 
     def __init__(self, columns: Columns, whitener: ComplexArray, free: ComplexArray) -> None:
         self.whitener = whitener
-        flat = whiten(whitener, free)
-        self.free = solve(flat, np.zeros(len(flat)))[1]
+        self.free = span(whiten(whitener, free))
         self.target: FloatArray | None = None
         self._columns = columns
         links = [equation.kind is EquationKind.LINK for equation in columns.data.equations]
         self.parts: IntArray = np.where(links, np.cumsum(links), 0)
-        self._kept: dict[tuple[Effect, tuple[Effect, ...]], FloatArray] = {}
+        self._kept: dict[tuple[Effect, tuple[Effect, ...]], Parts] = {}
         self._bytes = 0
 
     def flat(self, values: ComplexArray) -> FloatArray:
         """(M, ...) whitened real numbers from coefficients (H + 1, E, ...), without the samples that are left out."""
         return off(self.free, whiten(self.whitener, values))
 
-    def in_parts(self, values: ComplexArray) -> FloatArray:
-        """(G, M, ...) the same, in parts that add up."""
-        count = int(self.parts.max()) + 1
-        out = np.zeros((count, len(self.free), *values.shape[2:]))
-        for part in range(count):
-            own = np.where(self.parts[:, None] == part, values.reshape(*values.shape[:2], -1), 0.0)
-            if np.any(own):
-                out[part] = self.flat(own.reshape(values.shape))
-        return out
+    def in_parts(self, values: ComplexArray) -> Parts:
+        """The same of coefficients (H + 1, E, k), in parts that add up."""
+        return self._in_parts([values])[0]
 
-    def design(self, effects: Sequence[Effect]) -> FloatArray:
-        """(G, M, p) columns of a model in parts."""
+    def design(self, effects: Sequence[Effect]) -> Parts:
+        """Columns of a model in parts."""
         signals = signal_effects(effects)
-        return np.concatenate([self._of(effect, effects, signals) for effect in effects], axis=2)
+        missing = [effect for effect in effects if (effect, signals) not in self._kept]
+        if missing and self._bytes > PARTS_KEPT:
+            self._kept.clear()
+            self._bytes, missing = 0, list(effects)
+        # together, for what is done to one column costs little more for many
+        found = self._in_parts([self._columns.columns_behind(effect, signals) for effect in missing])
+        for effect, parts in zip(missing, found, strict=True):
+            self._kept[effect, signals] = parts
+            self._bytes += sum(block.rows.nbytes for block in parts.blocks)
+        blocks: list[Block] = []
+        width = 0
+        for effect in effects:
+            parts = self._kept[effect, signals]
+            blocks.extend(replace(block, first=block.first + width) for block in parts.blocks)
+            width += parts.shape[2]
+        return Parts((self._count, len(self.free), width), tuple(blocks))
 
-    def scaled(self, parts: FloatArray, scale: FloatArray) -> FloatArray:
-        """(M, ...) sum of parts (G, M, ...), each in the scale (E,) of its equations."""
-        factors = np.ones(len(parts))
+    def factors(self, scale: FloatArray) -> FloatArray:
+        """(G,) factor of every part where each equation has its scale (E,)."""
+        factors = np.ones(self._count)
         factors[self.parts] = scale
-        return np.tensordot(factors, parts, axes=1)
+        return factors
 
-    def _of(self, effect: Effect, effects: Sequence[Effect], signals: tuple[Effect, ...]) -> FloatArray:
-        key = (effect, signals)
-        if key not in self._kept:
-            if self._bytes > PARTS_KEPT:
-                self._kept.clear()
-                self._bytes = 0
-            self._kept[key] = self.in_parts(self._columns.column_spectra(effect, effects))
-            self._bytes += self._kept[key].nbytes
-        return self._kept[key]
+    @property
+    def _count(self) -> int:
+        return int(self.parts.max()) + 1
+
+    def _in_parts(self, columns: Sequence[ComplexArray]) -> list[Parts]:
+        places: list[tuple[int, int, int, int]] = []
+        flat: list[FloatArray] = []
+        for part in range(self._count):
+            own = np.flatnonzero(self.parts == part)
+            spans = [_filled(values[:, own]) for values in columns]
+            chosen = [values[:, own, begin:end] for values, (begin, end) in zip(columns, spans, strict=True)]
+            if any(values.shape[2] for values in chosen):
+                flat.append(whiten(self.whitener[:, :, own], np.concatenate(chosen, axis=2)))
+                places.extend((k, part, begin, end) for k, (begin, end) in enumerate(spans) if end > begin)
+        blocks: list[list[Block]] = [[] for _ in columns]
+        if flat:
+            rows, taken = np.ascontiguousarray(off(self.free, np.concatenate(flat, axis=1)).T), 0
+            for k, part, begin, end in places:
+                blocks[k].append(Block(part, begin, rows[taken : taken + end - begin]))
+                taken += end - begin
+        shapes = [(self._count, len(self.free), values.shape[2]) for values in columns]
+        return [Parts(shape, tuple(found)) for shape, found in zip(shapes, blocks, strict=True)]
+
+
+def _filled(values: ComplexArray) -> tuple[int, int]:
+    """First column of (H + 1, e, k) with anything in it, and the one after the last."""
+    filled = np.flatnonzero(np.any(values, axis=(0, 1)))
+    return (int(filled[0]), int(filled[-1]) + 1) if len(filled) else (0, 0)

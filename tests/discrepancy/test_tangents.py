@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
-from sea_ident.effects import effect_classes, make_effect
+from sea_ident.effects import corrected_motion, effect_classes, make_effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.signal import SignalEffect
 
@@ -179,3 +179,28 @@ def test_a_model_as_it_is_has_the_scale_that_its_fit_has(nothing_missing):
     bench, now = nothing_missing
     fit = now.fit
     np.testing.assert_allclose(bench.predicted(fit.effects, fit.parameters).scale, fit.scale, rtol=1e-12)
+
+
+@pytest.mark.parametrize("less", ["a mass", "a mass that has a moment", "a rotor"])
+def test_bodies_without_mass_and_rotors_without_inertia(nothing_missing, less):
+    bench, now = nothing_missing
+    robot, parameters = bench.robot, now.fit.parameters
+    body, rotor = robot.inertial_names[10].removesuffix(".m"), f"{robot.rotors[0].rotor_group}.rotor_inertia"
+    zero = {
+        "a mass": [f"{body}.{part}" for part in ("m", "mx", "my", "mz")],
+        "a mass that has a moment": [f"{body}.m"],
+        "a rotor": [rotor],
+    }[less]
+    waves = (make_effect("encoder_eccentricity", "knee", sine=size, cosine=size) for size in (-1e-4, 1e-4))
+    ends = [corrected_motion(robot, (wave,), bench.data.motion) for wave in waves]
+    rest, own, whole = (
+        bench._bodies_tangent(bench.state(()), *ends, known)
+        for known in (
+            {**parameters, **dict.fromkeys(zero, 0.0)},
+            {name: parameters[name] for name in zero},
+            parameters,
+        )
+    )
+    # the torque is linear in these parameters, however each of the three is computed
+    assert np.abs(own).max() > 0.0
+    np.testing.assert_allclose(rest + own, whole, atol=1e-10 * np.abs(whole).max())

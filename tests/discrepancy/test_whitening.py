@@ -30,8 +30,24 @@ def test_parts_in_any_scale_add_up(settled):
     # only equations with a spring have a scale of their own
     scale = np.where(whitening.parts > 0, rng.uniform(0.2, 5.0, shape[1]), 1.0)
     assert np.count_nonzero(scale != 1.0) == 3
-    parts = whitening.scaled(whitening.in_parts(values), scale)
+    parts = whitening.in_parts(values).scaled(whitening.factors(scale))
     np.testing.assert_allclose(parts, whitening.flat(values * scale[:, None]), atol=1e-9 * np.abs(parts).max())
+
+
+def test_columns_of_a_model_are_those_of_its_effects_in_their_order(settled):
+    bench, now = settled
+    whitening, effects = bench.whitening(now.noise), now.fit.effects
+    rng = np.random.default_rng(6)
+    scale = np.where(whitening.parts > 0, rng.uniform(0.2, 5.0, len(whitening.parts)), 1.0)
+    # a part of the model was asked for before
+    parts = [whitening.design(chosen) for chosen in (effects[1::2], effects)][1]
+    expected = whitening.flat(bench.design(effects) * scale[:, None])
+    np.testing.assert_allclose(
+        parts.scaled(whitening.factors(scale)), expected, atol=1e-9 * np.linalg.norm(expected, axis=0).max()
+    )
+    values = rng.standard_normal(expected.shape[1])
+    torque = whitening.factors(scale) @ (parts @ values)
+    np.testing.assert_allclose(torque, expected @ values, atol=1e-9 * np.abs(expected @ values).max())
 
 
 def test_a_fit_says_the_same_of_its_residual_as_a_plain_projection(settled):
