@@ -33,7 +33,7 @@ from sea_ident.effects.signal import SignalEffect
 FAMILY_LEVEL = 1e-3
 """Probability of accepting anything where nothing is missing."""
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 6
 """Largest number of effects that are added."""
 
 USEFUL_SHARE = 0.2
@@ -43,7 +43,10 @@ SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
 BESIDE_ANOTHER = 0.12
-"""And by this share of what another effect does to the same equation: the form of that one is never known better."""
+"""And by this share of what another effect does to the same equation: the form of that one is known no better, ..."""
+
+COMPLETE = 0.9
+"""... unless it explains this share of the excess: what another effect in the wrong form leaves is none of its own."""
 
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
@@ -217,6 +220,8 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest:
     own = own_torque(bench, new, -1)
     if own > LARGE_TORQUE and not is_signal(effect) and torque_change(bench, fit, new) < CANCELLED * own:
         return False
+    if fit.statistic - new.statistic > COMPLETE * fit.excess:
+        smallest = np.minimum(smallest, SMALLEST_SHARE)
     if np.all(visible_changes(bench, fit, new) < smallest):
         return False
     return scatter_p(periods, fit.whitened - new.whitened) <= SCATTER_LEVEL
