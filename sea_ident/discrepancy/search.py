@@ -37,7 +37,13 @@ MOST_EFFECTS = 6
 """Largest number of effects that are added."""
 
 USEFUL_SHARE = 0.2
-"""Share of the excess that an effect must explain to be accepted."""
+"""Share of the excess that an effect must explain to be accepted, ..."""
+
+MANY = 4
+"""... and from so many effects on that are there before it ..."""
+
+USEFUL_BESIDE_MANY = 0.5
+"""... this share: a few more that are really there explain the rest, what the library does not have is never done."""
 
 SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
@@ -213,7 +219,8 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest:
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
     effect = new.effects[-1]
-    if fit.statistic - new.statistic < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
+    useful = USEFUL_SHARE if len(fit.effects) - len(bench.effects) < MANY else USEFUL_BESIDE_MANY
+    if fit.statistic - new.statistic < useful * fit.excess or not physical(bench, new, -1):
         return False
     if len(bench.slack_links(new)) > len(bench.slack_links(fit)) or at_a_bound(effect) or too_short(bench, effect):
         return False
