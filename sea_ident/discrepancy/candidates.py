@@ -85,8 +85,9 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
     for name, kind in sorted(effect_classes().items()):
         if name in ONLY_AGAINST_REFERENCE or issubclass(kind, TrendEffect):
             continue
-        for effect in kind.instances(bench.robot):
-            if effect_key(effect) in present:
+        for place in kind.instances(bench.robot):
+            effect = place.beside() if effect_key(place) in present else place
+            if effect is None:
                 continue
             if {column.name for column in effect.columns(bench.robot)} & present_columns:
                 continue

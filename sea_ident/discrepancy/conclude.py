@@ -28,6 +28,7 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
+from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import Trend, TrendTest
@@ -66,6 +67,7 @@ def conclude(
     held: HeldOut | None,
     change: ParameterChange | None,
     notes: check.Findings,
+    nameless: tuple[Unnamed, ...] = (),
 ) -> Diagnosis:
     """Put together what is known of one recording.
 
@@ -77,6 +79,7 @@ def conclude(
         held: the data that were not used.
         change: against an earlier model, where one was given.
         notes: what is wrong with the data.
+        nameless: what explains the recording better in the place of an effect that was found, and has no name.
 
     Returns:
         The diagnosis, without model and forward simulation.
@@ -105,11 +108,13 @@ def conclude(
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
+    if nameless and verdict in (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS):
+        verdict = Verdict.NOT_IN_LIBRARY
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
-        other_motion=held is not None and held.other_motion,
+        other_motion=held is not None and held.other_motion, nameless=nameless,
     )  # fmt: skip
     found = Diagnosis(
         verdict=verdict,

@@ -22,6 +22,7 @@ from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
+from sea_ident.discrepancy.relatives import unnamed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
@@ -116,6 +117,7 @@ def diagnose(
     tell("testing on held-out data", 0.75)
     confirmed, alternatives, held, held_notes = _tested(bench, confirmed, alternatives, trends, holdout)
     selection = confirmed.selection
+    nameless = unnamed(bench, selection, held) if basic is None else ()
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
@@ -123,7 +125,7 @@ def diagnose(
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
     notes = replace(notes, warnings=(*notes.warnings, *found.notes, *basic_notes, *held_notes, *forward.notes))
     tell("writing it down", 0.95)
-    diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes)
+    diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
         diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
     if diagnosis.verdict is Verdict.AMBIGUOUS:

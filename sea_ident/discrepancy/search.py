@@ -35,17 +35,26 @@ from sea_ident.effects.spring import SpringEffect
 FAMILY_LEVEL = 1e-3
 """Probability of accepting anything where nothing is missing."""
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 6
 """Largest number of effects that are added."""
 
 USEFUL_SHARE = 0.2
-"""Share of the excess that an effect must explain to be accepted."""
+"""Share of the excess that an effect must explain to be accepted, ..."""
+
+MANY = 4
+"""... and from so many effects on that are there before it ..."""
+
+USEFUL_BESIDE_MANY = 0.5
+"""... this share: a few more that are really there explain the rest, what the library does not have is never done."""
 
 SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
 BESIDE_ANOTHER = 0.12
-"""And by this share of what another effect does to the same equation: the form of that one is never known better."""
+"""And by this share of what another effect does to the same equation: the form of that one is known no better, ..."""
+
+COMPLETE = 0.9
+"""... unless it explains this share of the excess: what another effect in the wrong form leaves is none of its own."""
 
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
@@ -215,13 +224,16 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest:
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
     effect = new.effects[-1]
-    if fit.statistic - new.statistic < USEFUL_SHARE * fit.excess or not physical(bench, new, -1):
+    useful = USEFUL_SHARE if len(fit.effects) - len(bench.effects) < MANY else USEFUL_BESIDE_MANY
+    if fit.statistic - new.statistic < useful * fit.excess or not physical(bench, new, -1):
         return False
     if len(bench.slack_links(new)) > len(bench.slack_links(fit)) or at_a_bound(effect) or too_short(bench, effect):
         return False
     own = own_torque(bench, new, -1)
     if own > LARGE_TORQUE and not is_signal(effect) and torque_change(bench, fit, new) < CANCELLED * own:
         return False
+    if fit.statistic - new.statistic > COMPLETE * fit.excess:
+        smallest = np.minimum(smallest, SMALLEST_SHARE)
     if np.all(visible_changes(bench, fit, new) < smallest):
         return False
     return scatter_p(periods, fit.whitened - new.whitened) <= SCATTER_LEVEL

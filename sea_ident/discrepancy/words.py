@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict
 from sea_ident.discrepancy.reference import ParameterChange
+from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.trend import TrendTest
 
 FEW_PERIODS = 10
@@ -30,6 +31,7 @@ class Facts:
         change: against a reference.
         units: unit of the torque of each joint.
         other_motion: whether the held-out data are another motion, not only other periods of the same.
+        nameless: what explains the recording better in the place of an effect that was found, and has no name.
     """
 
     verdict: Verdict
@@ -43,6 +45,7 @@ class Facts:
     change: ParameterChange | None
     units: Mapping[str, str]
     other_motion: bool = True
+    nameless: tuple[Unnamed, ...] = ()
 
 
 def paragraph(facts: Facts) -> str:
@@ -122,6 +125,12 @@ def _name(m: MissingEffect) -> str:
     return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
 
 
+def _better(one: Unnamed) -> str:
+    """What a nameless relative of an effect explains."""
+    share = f"{100 * one.share:.2g} %"
+    return f"The same as {one.effect} at {one.joint}, but {one.relative}, leaves {share} of what that one leaves."
+
+
 def _opening(facts: Facts) -> str:
     names = ", ".join(f"{_name(m)} ({m.extent})" for m in facts.missing)
     match facts.verdict:
@@ -141,7 +150,8 @@ def _opening(facts: Facts) -> str:
             return f"Something is missing; it looks like {names}, but that does not hold on other data."
         case Verdict.NOT_IN_LIBRARY:
             near = f" The nearest is {names}, which is no full explanation." if names else ""
-            return f"Something is missing that is not in the library.{near}"
+            better = "".join(f" {_better(relative)}" for relative in facts.nameless)
+            return f"Something is missing that is not in the library.{near}{better}"
         case Verdict.ONLY_AGAINST_REFERENCE:
             return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."
         case _ if facts.p_value < DISAGREES:

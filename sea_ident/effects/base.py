@@ -286,6 +286,10 @@ class Effect(ABC):
             for values in product(*grids)
         )
 
+    def beside(self) -> Self | None:
+        """The same effect in another form, which can stand in a model beside this one; by default there is none."""
+        return None
+
     def anchored(self, anchor: Anchor) -> Self:
         """The same effect, knowing what it needs of the rest of the model; by default it needs nothing."""
         return self

@@ -1,10 +1,15 @@
 """What the search adds to a model: small effects beside large ones, and the simpler of two that say the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.search import BESIDE_ANOTHER, search, visible_changes
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
 
@@ -53,3 +58,35 @@ def test_the_longest_wave_costs_more_than_a_constant(nothing_missing):
     assert not slowest(shorter)
     assert penalty(longest, bench) == pytest.approx(penalty(shorter, bench) + EQUALLY_GOOD)
     assert penalty(make_effect("torque_offset", "hip"), bench) < penalty(shorter, bench)
+
+
+def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_left(nothing_missing):
+    """Less than what counts as the form of the ripple, but a ripple in the wrong form would leave something."""
+    data = nothing_missing[0].data
+    theta, sign = data.motion.theta[:, 0], np.tanh(data.motion.dtheta[:, 0] / 0.02)
+    torque = data.tau_motor.copy()
+    torque[:, 0] += 8.0 * np.sin(12.0 * theta) + 0.8 * sign * np.sin(9.0 * theta)
+    bench = Bench(replace(data, tau_motor=torque), nothing_missing[0].effects)
+    found = search(bench, bench.effects)
+    assert named(found) == {("torque_ripple", "hip"), ("position_dependent_friction", "hip")}
+    fit = found.final.fit
+    sizes = {
+        effect.name: np.hypot(*(fit.parameters[c.name] for c in effect.columns(bench.robot)))
+        for effect in found.effects
+    }
+    assert sizes["torque_ripple"] == pytest.approx(8.0, rel=0.05)
+    assert sizes["position_dependent_friction"] < BESIDE_ANOTHER * sizes["torque_ripple"]
+
+
+def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
+    """The model has the cubic stiffness; a spring that stiffens with the square is no asymmetric one for that."""
+    planted = [("spring_stiffening", "knee", [3000.0], {"exponent": 2.0})]
+    bench = laboratory.bench(laboratory.record(planted, periods=5))
+    start = settle(bench, bench.effects)
+    best = scan(bench, start.fit, start.noise)[0].effect
+    assert (best.name, best.joint, best.exponent) == ("spring_stiffening", "knee", 2.0)
+    fit = bench.fit((*start.fit.effects, best), start.noise, start=start.fit.parameters)
+    (column,) = best.columns(bench.robot)
+    assert fit.parameters[column.name] == pytest.approx(3000.0, rel=0.05)
+    assert fit.parameters["knee.spring_stiffening"] == pytest.approx(8000.0, rel=0.1)
+    assert ("spring_stiffening", "knee") not in {(c.effect.name, c.effect.joint) for c in scan(bench, fit, start.noise)}

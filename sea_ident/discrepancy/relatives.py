@@ -1,0 +1,262 @@
+"""Nameless relatives of what was found: effects of nearly the same form that the library does not have.
+
+A search takes the nearest that there is. A ripple that grows with the load is found as a ripple, at the right joint and
+of the right order, and most of the gap goes with it; friction whose viscous part changes over the turn is found as
+friction whose dry part does. So every effect that was found is held against its own columns times a signal that they
+do not depend on, and against the same effect driven by another joint. Where one of these *in its place* leaves hardly
+anything of what the named effect leaves, the named one is not what is there.
+
+What depends on a signal already is not multiplied by it: friction that grows with another power of the speed is still
+friction that grows with the speed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from enum import StrEnum
+from functools import cache
+from typing import Self
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import Candidate, scan
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.heldout import HeldOut, tried
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.search import Selection, refitted
+from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Anchor, Column, Contribution, Effect, JointEffect, Side, State
+from sea_ident.effects.external_force import ExternalForce
+from sea_ident.effects.load import LoadEffect, MotorLoadEffect
+from sea_ident.effects.torque_constant import TorqueConstant
+from sea_ident.robot import Robot
+
+LEAVES = 0.3
+"""Share of the excess that a relative may leave of what the named effect leaves to be taken for the truth [-]."""
+
+PROMISED = 0.5
+"""Share of what the named effect explains that a relative must promise to explain before it is fitted [-]."""
+
+TRIED = 2
+"""Relatives of an effect that are fitted, those that promise most."""
+
+FASTER = 1.5
+"""Factor of the speed by which it is tried whether columns depend on it [-]."""
+
+FURTHER = 0.3
+"""Way by which all positions are moved to try whether columns depend on them [rad] or [m]."""
+
+DEPENDS = 0.1
+"""Share by which columns must change to depend on a signal: its sign alone, smoothed, changes less [-]."""
+
+
+class Growth(StrEnum):
+    """What the columns of a relative are multiplied by: a signal of the joint."""
+
+    LOAD = "load"
+    LOAD_MAGNITUDE = "magnitude of the load"
+    SPEED = "speed"
+    SPEED_MAGNITUDE = "magnitude of the speed"
+    POSITION = "position"
+
+
+_LOADS = (Growth.LOAD, Growth.LOAD_MAGNITUDE)
+_SPEEDS = (Growth.SPEED, Growth.SPEED_MAGNITUDE)
+
+
+@dataclass(frozen=True)
+class Unnamed:
+    """An effect that was found and a relative without a name that explains the recording much better.
+
+    Attributes:
+        effect: name of what was found.
+        joint: its joint.
+        relative: how the other differs, in words.
+        share: what it leaves of what the named one leaves [-].
+        fit: the whole model with it in the place of the effect.
+    """
+
+    effect: str
+    joint: str | None
+    relative: str
+    share: float
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Relative(Effect):
+    """What all relatives have beside the effect that they are related to, which is their other base class.
+
+    Attributes:
+        growth: what the columns are multiplied by, None where they are those of another joint.
+        carrier: knows the load of the joint.
+        middle: position at which what grows with the position vanishes [rad] or [m].
+        driver: the effect at the joint that drives it, None where it is the own.
+    """
+
+    growth: Growth | None = None
+    carrier: TorqueConstant = field(default_factory=TorqueConstant)
+    middle: float = 0.0
+    driver: Effect | None = None
+
+    def columns(self, robot: Robot) -> tuple[Column, ...]:
+        """Those of the effect; with any sign, for physics demands none of what has no name."""
+        return tuple(replace(column, nonnegative=False) for column in super().columns(robot))  # type: ignore[safe-super]
+
+    def evaluate(self, state: State) -> Contribution:
+        """Rows (N, n, k) of the effect times the signal, or those that it has at the other joint."""
+        if self.driver is not None:
+            shapes = {shape.name: getattr(self, shape.name) for shape in self.shapes}
+            return _rows_there(replace(self.driver, **shapes), state, str(self.joint))
+        part = super().evaluate(state)  # type: ignore[safe-super]
+        factor = self._factor(state)[:, None, None]
+        return Contribution(part.link * factor, part.motor * factor, part.joint)
+
+    def anchored(self, anchor: Anchor) -> Self:
+        """With what the model says of the joint, and of the one that drives it."""
+        driver = None if self.driver is None else self.driver.anchored(anchor)
+        return replace(super().anchored(anchor), carrier=self.carrier.anchored(anchor), driver=driver)
+
+    def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
+        """Whatever: nothing is known of what has no name."""
+        return True
+
+    def _factor(self, state: State) -> FloatArray:
+        """(N,) signal that it grows with."""
+        i = state.robot.index(str(self.joint))
+        motion = state.motion
+        if self.growth in _LOADS:
+            signal = self.carrier.load(state)
+        elif self.growth in _SPEEDS:
+            signal = motion.dtheta[:, i]
+        else:
+            signal = motion.theta[:, i] - self.middle
+        magnitude = self.growth in (Growth.LOAD_MAGNITUDE, Growth.SPEED_MAGNITUDE)
+        return np.abs(signal) if magnitude else np.asarray(signal, dtype=np.float64)
+
+
+def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple[Relative, ...]:
+    """All relatives of an effect of a model; none of what is no torque of a single joint in every period."""
+    if effect.joint is None or is_signal(effect) or isinstance(effect, ExternalForce):
+        return ()
+    state = bench.state(model)
+    grown = [growth for growth in Growth if not _depends(state, effect, growth)]
+    drivers: list[Effect] = []
+    # a spring acts between the two sides of its own joint, whatever the others do
+    if isinstance(effect, JointEffect | LoadEffect) and effect.side is not Side.SPRING:
+        places = [place.joint for place in type(effect).instances(bench.robot) if place.joint != effect.joint]
+        drivers = [replace(effect, joint=joint) for joint in places]
+    own = {item.name: getattr(effect, item.name) for item in fields(effect)}
+    kind, carrier = _related(type(effect)), TorqueConstant(joint=effect.joint)
+    middle = float(np.mean(state.motion.theta[:, bench.robot.index(effect.joint)]))
+    return (
+        *(kind(**own, growth=growth, carrier=carrier, middle=middle) for growth in grown),
+        *(kind(**own, carrier=carrier, driver=driver) for driver in drivers),
+    )
+
+
+def unnamed(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
+    """Effects that were found in the place of which a relative explains the recording much better.
+
+    Args:
+        bench: the recording.
+        selection: what was found.
+        held: data that were not used; what a relative explains must hold on another motion too.
+
+    Returns:
+        One entry for every such effect, with its best relative.
+    """
+    now = selection.final
+    if not selection.added or lack_of_fit(bench, now)[2] >= LACK_LEVEL:
+        return ()
+    first, found = len(now.fit.effects) - selection.added, []
+    for k in range(selection.added):
+        best = _best(bench, now, first + k)
+        if best is not None and _holds(best, selection, held, k):
+            found.append(best)
+    return tuple(found)
+
+
+def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int) -> bool:
+    """Whether a relative explains another motion as well, and better than the effect that was found."""
+    if held is None or not held.other_motion:
+        return True
+    replaced = replace(selection, final=replace(selection.final, fit=relative.fit))
+    rival, own = tried(held.bench, replaced, held.source).transfers[k], held.transfers[k]
+    return rival.holds and rival.statistic < own.statistic
+
+
+def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
+    fit, noise = now.fit, now.noise
+    own = fit.effects[position]
+    others = [e for k, e in enumerate(fit.effects) if k != position]
+    family = relatives_of(bench, fit.effects, own)
+    if not family:
+        return None
+    reduced = bench.fit(others, noise, start=fit.parameters)
+    gain = reduced.statistic - fit.statistic
+    best: Unnamed | None = None
+    for candidate in scan(bench, reduced, noise, family)[:TRIED]:
+        if candidate.gain < PROMISED * gain:
+            continue
+        new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
+        unit = max(new.statistic / max(new.dof, 1), 1.0)
+        share = new.excess / max(fit.excess, 1.0)
+        if share > LEAVES or fit.statistic - new.statistic < EQUALLY_GOOD * unit:
+            continue
+        if best is None or share < best.share:
+            best = Unnamed(own.name, own.joint, _in_words(candidate), share, new)
+    return best
+
+
+def _in_words(candidate: Candidate) -> str:
+    relative = candidate.effect
+    if isinstance(relative, Relative) and relative.growth is not None:
+        return f"growing with the {relative.growth}"
+    driver = relative.driver if isinstance(relative, Relative) else None
+    return f"driven by {driver.joint if driver is not None else 'another joint'}"
+
+
+def _depends(state: State, effect: Effect, growth: Growth) -> bool:
+    """Whether the columns of an effect depend on a signal, and not on its sign alone."""
+    if growth in _LOADS:
+        return isinstance(effect, LoadEffect) or effect.side is Side.SPRING
+    motion = state.motion
+    if growth in _SPEEDS:
+        changed = replace(motion, dq=FASTER * motion.dq, dtheta=FASTER * motion.dtheta)
+    else:
+        changed = replace(motion, q=motion.q + FURTHER, theta=motion.theta + FURTHER)
+    before, after = (effect.evaluate(s) for s in (state, State(state.robot, changed, state.channels)))
+    size = np.linalg.norm(before.link) + np.linalg.norm(before.motor)
+    change = np.linalg.norm(after.link - before.link) + np.linalg.norm(after.motor - before.motor)
+    return bool(change > DEPENDS * size)
+
+
+def _rows_there(driver: Effect, state: State, joint: str) -> Contribution:
+    """Rows (N, n, k) at a joint of what acts at another one.
+
+    What follows the torque of a joint follows all that its motor gives, with its inertia and friction: at the joint
+    itself these take up their part.
+    """
+    here, there = state.robot.index(joint), state.robot.index(str(driver.joint))
+    if isinstance(driver, MotorLoadEffect):
+        columns = driver.column_of(driver.motor_torque(state), state.motion.dtheta[:, there])
+        return state.at(Side.MOTOR, joint, columns)
+    rows = driver.evaluate(state)
+    return Contribution(_moved(rows.link, there, here), _moved(rows.motor, there, here), here)
+
+
+def _moved(rows: FloatArray, source: int, target: int) -> FloatArray:
+    """Rows (N, n, k) with those of one joint at another, and nothing elsewhere."""
+    out = np.zeros_like(rows)
+    out[:, target] = rows[:, source]
+    return out
+
+
+@cache
+def _related(form: type[Effect]) -> type[Relative]:
+    """The class of the relatives of an effect: they have its shapes, and are refined as it is."""
+    return dataclass(frozen=True)(type(f"RelativeOf{form.__name__}", (Relative, form), {}))

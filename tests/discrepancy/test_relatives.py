@@ -1,0 +1,120 @@
+"""Effects that the library does not have, but one that is nearly the same.
+
+Their torque is added to that of a leg that has nothing but what the model has, on its motion as it was measured.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.check import Findings
+from sea_ident.discrepancy.conclude import conclude
+from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.relatives import Growth, relatives_of, unnamed
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.effects import Effect, make_effect
+
+HIP, KNEE, ANKLE = range(3)
+
+
+def with_torque(bench: Bench, *torques: tuple[int, np.ndarray]) -> Bench:
+    """The same motion with more torque (N,) of some motors."""
+    total = bench.data.tau_motor.copy()
+    for joint, torque in torques:
+        total[:, joint] += torque
+    return Bench(replace(bench.data, tau_motor=total), bench.effects)
+
+
+def found(bench: Bench, *effects: Effect) -> Selection:
+    """What a search would give that found these."""
+    start = settle(bench, bench.effects)
+    begun = bench.anchored((*start.fit.effects, *effects), start.fit.parameters)
+    fit = bench.refine(begun, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    final = settle_again(bench, settle_again(bench, fit).fit)
+    return Selection(start, final, len(effects), (0.0,) * len(effects))
+
+
+@pytest.fixture(scope="module")
+def ripple_found(nothing_missing):
+    """A ripple at the hip that grows with the deflection, found as a ripple, and what that is held against."""
+    bench, motion = nothing_missing[0], nothing_missing[0].data.motion
+    torque = 25.0 * motion.deflection[:, HIP] * np.sin(12.0 * motion.theta[:, HIP])
+    bench = with_torque(bench, (HIP, torque))
+    selection = found(bench, make_effect("torque_ripple", "hip", order=12.5))
+    return bench, selection, *unnamed(bench, selection, None)
+
+
+def test_a_ripple_that_grows_with_the_load_is_not_a_ripple(ripple_found):
+    bench, _, one = ripple_found
+    assert (one.effect, one.joint, one.relative) == ("torque_ripple", "hip", "growing with the load")
+    assert one.share < 0.2
+    # it has the order that was planted, and the amplitude
+    relative = one.fit.effects[-1]
+    assert relative.order == pytest.approx(12.0, abs=0.5)
+    amplitude = np.hypot(*(one.fit.parameters[c.name] for c in relative.columns(bench.robot)))
+    assert amplitude * bench.robot.spring("hip").stiffness == pytest.approx(25.0, rel=0.1)
+
+
+def test_it_is_said_in_the_verdict_and_in_words(ripple_found):
+    bench, selection, one = ripple_found
+    confirmed = Confirmed(selection, bench, selection.start, selection.final)
+    nothing = TrendTest(1.0, (), False)
+    said = [conclude(bench, confirmed, nothing, {}, None, None, Findings(), found) for found in ((), (one,))]
+    assert [diagnosis.verdict for diagnosis in said] == [Verdict.NAMED_WITH_REMAINDER, Verdict.NOT_IN_LIBRARY]
+    # the nearest is still told
+    assert [(m.effect, m.joint) for m in said[1].missing] == [("torque_ripple", "hip")]
+    assert "The same as torque_ripple at hip, but growing with the load, leaves" in said[1].text
+
+
+def test_what_is_there_keeps_its_name_where_something_else_is_missing(nothing_missing):
+    bench, motion = nothing_missing[0], nothing_missing[0].data.motion
+    ripple = 0.5 * np.sin(4.0 * motion.theta[:, HIP] + 0.3)
+    wave = 0.4 * np.sin(2.0 * np.pi * 7.0 * (motion.time - motion.time[0]) / bench.data.period)
+    bench = with_torque(bench, (HIP, ripple), (ANKLE, wave))
+    selection = found(bench, make_effect("torque_ripple", "hip", order=4.1))
+    assert selection.final.fit.statistic > 2.0 * selection.final.fit.dof
+    assert unnamed(bench, selection, None) == ()
+
+
+def test_torque_of_one_joint_in_the_signal_of_another(nothing_missing):
+    """Five hundredths of the knee's torque in the ankle's signal, inertia and friction of the knee's motor with it."""
+    bench = nothing_missing[0]
+    bench = with_torque(bench, (ANKLE, 0.05 * bench.data.tau_motor[:, KNEE]))
+    (one,) = unnamed(bench, found(bench, make_effect("torque_constant", "ankle")), None)
+    assert (one.effect, one.joint, one.relative) == ("torque_constant", "ankle", "driven by knee")
+    (column,) = one.fit.effects[-1].columns(bench.robot)
+    assert one.fit.parameters[column.name] == pytest.approx(0.05, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "growths"),
+    [
+        ("torque_ripple", {"order": 12.0}, {"load", "magnitude of the load", "speed", "magnitude of the speed"}),
+        (
+            "position_dependent_friction", {"order": 4.0},
+            {"load", "magnitude of the load", "speed", "magnitude of the speed"},
+        ),
+        ("nonlinear_viscous_friction", {"exponent": 2.0}, {"load", "magnitude of the load", "position"}),
+        ("stribeck_friction", {"speed": 0.1}, {"load", "magnitude of the load", "position"}),
+        ("load_dependent_friction", {}, {"speed", "magnitude of the speed", "position"}),
+        ("asymmetric_spring", {}, {"speed", "magnitude of the speed", "position"}),
+        ("torque_offset", {}, set(map(str, Growth))),
+    ],
+)  # fmt: skip
+def test_an_effect_grows_with_nothing_that_it_depends_on(nothing_missing, name, shape, growths):
+    """Another power of the speed is another form of friction that grows with the speed, not another effect."""
+    bench, start = nothing_missing
+    family = relatives_of(bench, start.fit.effects, make_effect(name, "knee", **shape))
+    assert {str(one.growth) for one in family if one.growth is not None} == growths
+
+
+def test_no_relatives_of_what_is_no_torque_of_one_joint(nothing_missing):
+    bench, start = nothing_missing
+    for effect in (make_effect("position_delay", "knee"), make_effect("external_force", "knee")):
+        assert relatives_of(bench, start.fit.effects, effect) == ()
+    assert relatives_of(bench, start.fit.effects, make_effect("base_tilt")) == ()
