@@ -11,6 +11,9 @@ from sea_ident.effects.drift import TrendEffect
 LOG_STEP = 1e-3
 """Step of the logarithm of a time constant by which the change of a course is told."""
 
+STRAIGHT = 1000.0
+"""Lengths of a recording in a time constant with which a course is straight: to half a thousandth of its change."""
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -47,7 +50,7 @@ def time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]
     if not any(shape.name == "time_constant" for shape in getattr(effect, "shapes", ())):
         return (getattr(effect, "time_constant", 0.0),)
     length = float(middle[-1] + middle[0])
-    return tuple(float(c) for c in (*np.geomspace(0.1 * length, 0.8 * length, 13), 20.0 * length))
+    return tuple(float(c) for c in (*np.geomspace(0.1 * length, 3.0 * length, 13), STRAIGHT * length))
 
 
 def bend(effect: TrendEffect, middle: FloatArray, temperature: FloatArray | None) -> FloatArray:

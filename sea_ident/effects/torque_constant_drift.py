@@ -42,8 +42,10 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
         return state.at(self.side, self.at, column[:, None])
 
     def steady(self, state: State) -> Contribution:
-        """Motor torque."""
-        return state.at(self.side, self.at, self.motor_torque(state)[:, None])
+        """Motor torque: as it was measured where it was, for a model that lacks something does not have it all."""
+        measured = None if state.channels is None else state.channels.get("tau_motor")
+        torque = self.motor_torque(state) if measured is None else measured[:, state.robot.index(self.at)]
+        return state.at(self.side, self.at, torque[:, None])
 
     def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
         """The drift."""
