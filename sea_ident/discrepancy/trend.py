@@ -12,7 +12,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
-from sea_ident.discrepancy.trend_directions import Direction, Name, steady_rows, trend_directions
+from sea_ident.discrepancy.trend_directions import Direction, Name, PeriodColumns, courses, steady_rows
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.discrepancy.trend_search import Chosen, alike, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import Course, course_values
@@ -104,41 +104,46 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     flat = np.stack([whiten(whitener, residual) for residual in residuals]) / np.sqrt(periods)
     flat = flat - (flat @ free) @ free.T
     flat -= flat.mean(axis=0)
-    middle: FloatArray = (np.arange(periods, dtype=np.float64) + 0.5) * bench.data.period
-    directions = trend_directions(bench, fit, whitener / np.sqrt(periods), free, middle, temperature)
+    middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
     omnibus = _omnibus(flat, middle, noise)
+    columns = PeriodColumns(bench, fit, whitener / np.sqrt(periods), free)
+    causes = columns.causes(temperature)
+    if not causes:
+        return TrendTest(min(1.0, 2.0 * omnibus), (), omnibus < LEVEL)
+    space = column_space(causes)
+    numbers = flat @ space
+    directions = [d for cause in causes for d in courses(cause, columns.within(cause, space), middle)]
     notes: tuple[str, ...] = ()
     if periods > FEWEST_AFTER_START:
-        later_periods = flat[1:]
-        later = later_periods - later_periods.mean(axis=0)
+        later = flat[1:] - flat[1:].mean(axis=0)
         settled = _omnibus(later, middle[1:], noise)
         started = omnibus < LEVEL < settled
-        if started and directions:
-            first = best_trend(flat, directions, middle, noise)
-            differs = min(first.p_value, _apart(flat[0], later_periods)) < LEVEL
-            started = differs and _only_in_the_first(flat, later, first.direction)
+        if started:
+            first = best_trend(numbers, directions, middle, noise)
+            differs = min(first.p_value, _apart(flat[0], flat[1:])) < LEVEL
+            started = differs and _only_in_the_first(numbers, first.direction)
         if started:
             notes = (
                 f"{bench.data.source}: the first period differs from the {periods - 1} later ones, which are "
                 "alike: the motion was still settling. It was left out of the search for trends; start recording later",
             )
-            flat, middle, omnibus, periods = later, middle[1:], settled, periods - 1
+            flat, numbers, middle, omnibus = later, later @ space, middle[1:], settled
             directions = [d.over(slice(1, None)) for d in directions]
-    if not directions:
-        return TrendTest(min(1.0, 2.0 * omnibus), (), omnibus < LEVEL, notes)
-    space = column_space(directions)
-    numbers = flat @ space
-    scatter = scatter_whitener(numbers)
+    scatter = scatter_whitener(numbers, middle)
     numbers = numbers @ scatter
-    inside = [replace(d, columns=scatter @ (space.T @ d.columns)) for d in directions]
+    directions = [replace(d, columns=scatter @ d.columns) for d in directions]
     change = _Change(bench, fit)
-    chosen = find_trends(numbers, inside, middle, noise, MOST_TRENDS, LEVEL, lambda d, v: change(d, v) >= SMALLEST_CHANGE)
+    chosen = find_trends(
+        numbers, directions, middle, noise, MOST_TRENDS, LEVEL, lambda d, v: change(d, v) >= SMALLEST_CHANGE
+    )
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
-        column_p = best_trend(numbers, inside, middle, noise).p_value
-    trends = tuple(_trend(numbers, chosen, k, inside, change) for k in range(len(chosen)))
-    whole = {d.name: d.columns for d in directions}
-    held = held_basis([replace(c.direction, columns=whole[c.direction.name]) for c in chosen])
+        column_p = best_trend(numbers, directions, middle, noise).p_value
+    trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
+    whole = {cause.name: cause for cause in causes}
+    held = held_basis(
+        [replace(c.direction, columns=columns.within(whole[c.direction.name])[-len(flat) :]) for c in chosen]
+    )
     left = flat if held is None else off(held, flat.ravel()).reshape(flat.shape)
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, _omnibus(left, middle, noise) < LEVEL, notes)
 
@@ -161,27 +166,28 @@ def within_periods(
     """
     data = bench.data
     phase = (np.arange(data.samples) + 0.5) / data.samples
-    time = (np.arange(data.periods)[:, None] + phase) * data.period
+    time = data.starts[:, None] + phase * data.period
     total = np.zeros((data.samples, len(data.equations)))
     for trend in trends:
         if not isinstance(trend.effect, TrendEffect):
             continue
         own = None
         if temperature is not None and trend.effect.joint is not None:
-            middle = (np.arange(data.periods) + 0.5) * data.period
+            middle = data.starts + 0.5 * data.period
             each = temperature[:, bench.robot.index(trend.effect.joint)]
             own = interp1d(middle, each, fill_value="extrapolate")(time.ravel())
         change = trend.effect.change(time.ravel(), own).reshape(time.shape)
         course = np.mean(change - np.mean(change, axis=1, keepdims=True), axis=0)
-        total += course[:, None] * (data.rows(steady_rows(bench, fit, trend.effect)) @ trend.values)
+        values = trend.effect.referred(trend.values, -float(np.mean(change)))
+        total += course[:, None] * (data.rows(steady_rows(bench, fit, trend.effect)) @ values)
     return total
 
 
-def _only_in_the_first(flat: FloatArray, later: FloatArray, direction: Direction) -> bool:
+def _only_in_the_first(numbers: FloatArray, direction: Direction) -> bool:
     """Whether a trend is not seen without the first period."""
-    rest = direction.over(slice(1, None))
-    expected = gain(flat, direction)[0] * float(np.sum(rest.profile**2) / np.sum(direction.profile**2))
-    return bool(gain(later, rest)[0] < max(CARRIED_ON * expected, CHANCE * direction.columns.shape[1]))
+    rest, later = direction.over(slice(1, None)), numbers[1:] - numbers[1:].mean(axis=0)
+    expected = gain(numbers, direction)[0] * float(np.sum(rest.profile**2) / np.sum(direction.profile**2))
+    return bool(gain(later, rest)[0] < max(CARRIED_ON * expected, CHANCE * direction.columns.shape[2]))
 
 
 def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
@@ -231,8 +237,8 @@ def _trend(
     """One of the trends that were chosen, its values beside the others, and what else it could be."""
     own, others = chosen[position], [c for k, c in enumerate(chosen) if k != position]
     direction = own.direction
-    courses = [Course(c.direction.profile, c.direction.columns, _free_bend(c.direction)) for c in (own, *others)]
-    values, *_ = course_values(numbers, courses)
+    together = [Course(c.direction.profile, c.direction.columns, _free_bend(c.direction)) for c in (own, *others)]
+    values, *_ = course_values(numbers, together)
     held = held_basis([c.direction for c in others])
     taken = {c.direction.name for c in chosen}
     alternatives: dict[Name, tuple[Effect, float]] = {}
@@ -245,16 +251,24 @@ def _trend(
             share = alike(numbers, direction, other, held)
             if share > alternatives.get(other.name, (other.effect, 0.0))[1]:
                 alternatives[other.name] = (other.effect, share)
+    at_start = _at_start(direction, values.values)
     return Trend(
         effect=direction.effect,
-        values=values.values,
-        stds=values.stds,
+        values=at_start,
+        # of a share of what drifts itself: d (v / (1 + v c)) = (1 / (1 + v c))^2 dv
+        stds=values.stds * (at_start / np.where(values.values == 0.0, 1.0, values.values)) ** 2,
         gain=own.gain,
         p_value=own.p_value,
         torque_change=change(direction, values.values),
         alternatives=tuple(sorted(alternatives.values(), key=lambda a: -a[1])),
         time_constant_std=getattr(direction.effect, "time_constant", 0.0) * values.bend_std,
     )
+
+
+def _at_start(direction: Direction, values: FloatArray) -> FloatArray:
+    if not isinstance(direction.effect, TrendEffect):
+        return values
+    return direction.effect.referred(values, direction.level)
 
 
 def _free_bend(direction: Direction) -> FloatArray | None:

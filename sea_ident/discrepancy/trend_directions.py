@@ -18,15 +18,36 @@ Name = tuple[str, str | None]
 
 
 @dataclass(frozen=True, eq=False)
+class Cause:
+    """A trend without a course.
+
+    Attributes:
+        effect: the effect.
+        columns: (M, k) its whitened columns in the mean period.
+        temperature: (P,) of its joint [degC], None where it was not measured or does not matter.
+    """
+
+    effect: Effect
+    columns: FloatArray
+    temperature: FloatArray | None
+
+    @property
+    def name(self) -> Name:
+        """Effect and joint."""
+        return self.effect.name, self.effect.joint
+
+
+@dataclass(frozen=True, eq=False)
 class Direction:
     """A trend with one course.
 
     Attributes:
         effect: the effect, with the time constant of the course.
         profile: (P,) course, without mean.
-        columns: (M, k) whitened columns.
+        columns: (P, M, k) whitened columns of every period.
         bend: (P,) change of the course with the logarithm of its time constant, None where it has none.
         bent: whether a time constant was chosen, against a straight course.
+        level: mean of the course.
     """
 
     effect: Effect
@@ -34,6 +55,7 @@ class Direction:
     columns: FloatArray
     bend: FloatArray | None = None
     bent: bool = False
+    level: float = 0.0
 
     @property
     def name(self) -> Name:
@@ -42,12 +64,18 @@ class Direction:
 
     def only(self, used: tuple[int, ...]) -> "Direction":
         """The same with some of its columns."""
-        return replace(self, columns=self.columns[:, list(used)])
+        return replace(self, columns=self.columns[:, :, list(used)])
 
     def over(self, periods: slice) -> "Direction":
         """The same in a part of the periods."""
         profile, bent = self.profile[periods], None if self.bend is None else self.bend[periods]
-        return replace(self, profile=profile - profile.mean(), bend=None if bent is None else bent - bent.mean())
+        return replace(
+            self,
+            profile=profile - profile.mean(),
+            level=self.level + float(profile.mean()),
+            columns=self.columns[periods],
+            bend=None if bent is None else bent - bent.mean(),
+        )
 
 
 def trend_effects(bench: Bench) -> list[Effect]:
@@ -66,46 +94,72 @@ def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect) -> Contribution:
     return effect.steady(replace(state, channels=channels))
 
 
-def trend_directions(
-    bench: Bench,
-    fit: Fit,
-    whitener: ComplexArray,
-    free: FloatArray,
-    middle: FloatArray,
-    temperature: FloatArray | None,
-) -> list[Direction]:
-    """Every trend in every course that is tried.
+class PeriodColumns:
+    """Columns of trends in the periods of a recording.
 
     Args:
         bench: the recording.
         fit: the model.
         whitener: (H + 1, E, E) of one period.
         free: (M, m) orthonormal basis of the samples that are left out, whitened.
+    """
+
+    def __init__(self, bench: Bench, fit: Fit, whitener: ComplexArray, free: FloatArray) -> None:
+        self._bench, self._fit, self._whitener, self._free = bench, fit, whitener, free
+
+    def causes(self, temperature: FloatArray | None) -> list[Cause]:
+        """Every trend of the library that shows in anything.
+
+        Args:
+            temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+
+        Returns:
+            The trends.
+        """
+        bench, fit = self._bench, self._fit
+        found: list[Cause] = []
+        for plain in trend_effects(bench):
+            effect = bench.anchored((*fit.effects, plain), fit.parameters)[-1]
+            if not isinstance(effect, TrendEffect):
+                continue
+            own = None
+            if temperature is not None and effect.joint is not None:
+                own = temperature[:, bench.robot.index(effect.joint)]
+                own = own if np.all(np.isfinite(own)) else None
+            try:
+                effect.change(np.zeros(bench.data.periods), own)
+                spectra = bench.spectra_of(steady_rows(bench, fit, effect), fit.effects) * fit.scale[:, None]
+            except EffectError:
+                continue
+            columns = off(self._free, whiten(self._whitener, spectra))
+            if np.all(np.linalg.norm(columns, axis=0) > 0.0):
+                found.append(Cause(effect, columns, own))
+        return found
+
+    def within(self, cause: Cause, space: FloatArray | None = None) -> FloatArray:
+        """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""
+        if not isinstance(cause.effect, TrendEffect):
+            raise TypeError(f"{cause.effect.name} is no trend")
+        changes = self._bench.period_column_changes(cause.effect, self._fit)
+        each = [cause.columns + off(self._free, whiten(self._whitener, change)) for change in changes]
+        return np.stack(each if space is None else [space.T @ columns for columns in each])
+
+
+def courses(cause: Cause, columns: FloatArray, middle: FloatArray) -> list[Direction]:
+    """A trend in every course that is tried.
+
+    Args:
+        cause: the trend.
+        columns: (P, M, k) its columns in every period.
         middle: (P,) middles of the periods [s].
-        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
 
     Returns:
-        The trends; those that show in nothing are left out.
+        The trend with each of its time constants; without those in which nothing changes.
     """
-    found: list[Direction] = []
-    for plain in trend_effects(bench):
-        effect = bench.anchored((*fit.effects, plain), fit.parameters)[-1]
-        if not isinstance(effect, TrendEffect):
-            continue
-        own = None
-        if temperature is not None and effect.joint is not None:
-            own = temperature[:, bench.robot.index(effect.joint)]
-            own = own if np.all(np.isfinite(own)) else None
-        try:
-            spectra = bench.spectra_of(steady_rows(bench, fit, effect), fit.effects) * fit.scale[:, None]
-            columns = off(free, whiten(whitener, spectra))
-            variants = [replace(effect, time_constant=c) for c in time_constants(effect, middle)]  # type: ignore[call-arg]
-            courses = [with_course(variant, columns, middle, own) for variant in variants]
-        except EffectError:
-            continue
-        if np.all(np.linalg.norm(columns, axis=0) > 0.0):
-            found.extend(d for d in courses if np.linalg.norm(d.profile) > 1e-12)
-    return found
+    constants = time_constants(cause.effect, middle)
+    effects = [replace(cause.effect, time_constant=c) for c in constants] if len(constants) > 1 else [cause.effect]  # type: ignore[call-arg]
+    found = [with_course(effect, columns, middle, cause.temperature) for effect in effects]
+    return [d for d in found if np.linalg.norm(d.profile) > 1e-12]
 
 
 def with_course(
@@ -115,7 +169,7 @@ def with_course(
 
     Args:
         effect: the trend.
-        columns: (M, k) whitened columns.
+        columns: (P, M, k) whitened columns of every period.
         middle: (P,) middles of the periods [s].
         temperature: (P,) of its joint [degC], None where it was not measured.
 
@@ -128,7 +182,8 @@ def with_course(
     if not isinstance(effect, TrendEffect):
         raise TypeError(f"{effect.name} is no trend")
     change, constants = effect.change(middle, temperature), time_constants(effect, middle)
+    level = float(change.mean())
     if len(constants) == 1:
-        return Direction(effect, change - change.mean(), columns)
+        return Direction(effect, change - level, columns, level=level)
     bent = effect.time_constant < constants[-1]  # type: ignore[attr-defined]
-    return Direction(effect, change - change.mean(), columns, bend(effect, middle, temperature), bent)
+    return Direction(effect, change - level, columns, bend(effect, middle, temperature), bent, level)

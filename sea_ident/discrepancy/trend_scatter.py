@@ -11,7 +11,8 @@ import numpy as np
 from scipy import stats
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.trend_directions import Direction
+from sea_ident.discrepancy.trend_directions import Cause, Direction
+from sea_ident.discrepancy.trend_values import times_course
 
 SAME = 1e-6
 """Combinations of columns weaker than this share of the strongest are the same column twice."""
@@ -23,16 +24,15 @@ FEWEST_LEFT = 4
 """Degrees of freedom that these leave to the scatter; with fewer periods their degree is lower."""
 
 
-def column_space(directions: Sequence[Direction]) -> FloatArray:
+def column_space(causes: Sequence[Cause]) -> FloatArray:
     """(M, K) orthonormal basis of the columns of all trends."""
-    unlike = {d.name: d.columns for d in directions}
-    columns = np.concatenate(list(unlike.values()), axis=1)
+    columns = np.concatenate([cause.columns for cause in causes], axis=1)
     columns = columns / np.linalg.norm(columns, axis=0)
     basis, strength, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(basis[:, strength > SAME * strength[0]], dtype=np.float64)
 
 
-def scatter_whitener(periods: FloatArray) -> FloatArray:
+def scatter_whitener(periods: FloatArray, middle: FloatArray) -> FloatArray:
     """(K, K) symmetric matrix that turns the scatter of the periods into unit variance, where it is more than that.
 
     Few periods scatter more in some directions than in others by chance alone: only what goes beyond the largest that
@@ -41,13 +41,14 @@ def scatter_whitener(periods: FloatArray) -> FloatArray:
 
     Args:
         periods: (P, K) whitened numbers of every period.
+        middle: (P,) middles of the periods [s].
 
     Returns:
         The matrix.
     """
     count, width = periods.shape
     degree = int(np.clip(count - 1 - FEWEST_LEFT, 1, SMOOTH))
-    smooth = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), degree + 1))[0]
+    smooth = np.linalg.qr(np.vander((middle - middle.mean()) / np.ptp(middle), degree + 1))[0]
     rest = periods - smooth @ (smooth.T @ periods)
     freedom = count - degree - 1
     axes, size = np.linalg.svd(rest.T / np.sqrt(freedom), full_matrices=False)[:2]
@@ -62,9 +63,10 @@ def scatter_whitener(periods: FloatArray) -> FloatArray:
 
 def blocks(direction: Direction, *, bends: bool = False) -> FloatArray:
     """(P M, k) columns of a trend over all periods, in unit length; with the bend of its course beside them."""
-    courses = [direction.profile, *([direction.bend] if bends and direction.bend is not None else [])]
-    found = np.concatenate([np.multiply.outer(c, direction.columns).reshape(-1, direction.columns.shape[1]) for c in courses], axis=1)
-    return np.asarray(found / np.linalg.norm(found, axis=0), dtype=np.float64)
+    found = [times_course(direction.columns, direction.profile)]
+    if bends and direction.bend is not None:
+        found.append(times_course(direction.columns, direction.bend))
+    return np.concatenate([part / np.linalg.norm(part, axis=0) for part in found], axis=1)
 
 
 def held_basis(held: Sequence[Direction]) -> FloatArray | None:

@@ -11,6 +11,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.trend_directions import Direction, with_course
 from sea_ident.discrepancy.trend_scatter import blocks, gain, held_basis, scatter_p
+from sea_ident.discrepancy.trend_values import times_course
 
 PRICE_OF_A_BEND = 6.6
 """What a time constant of its own must explain beyond a straight course, or one that was measured: one in a hundred."""
@@ -147,10 +148,10 @@ def _exchanged(
 def _values(periods: FloatArray, chosen: Chosen, held: Sequence[Direction]) -> FloatArray:
     """(k,) values of a trend beside others; those of columns that do not speak for it are zero."""
     own = chosen.direction.only(chosen.used)
-    lengths = np.linalg.norm(own.profile) * np.linalg.norm(own.columns, axis=0)
+    lengths = np.linalg.norm(times_course(own.columns, own.profile), axis=0)
     design = np.concatenate([blocks(own), *(blocks(d, bends=True) for d in held)], axis=1)
     amounts = np.linalg.lstsq(design, periods.ravel(), rcond=1e-10)[0]
-    values = np.zeros(chosen.direction.columns.shape[1])
+    values = np.zeros(chosen.direction.columns.shape[2])
     values[list(chosen.used)] = amounts[: len(chosen.used)] / lengths
     return values
 
