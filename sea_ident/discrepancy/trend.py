@@ -118,7 +118,7 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
         later = flat[1:] - flat[1:].mean(axis=0)
         settled = _omnibus(later, middle[1:], noise)
         started = omnibus < LEVEL < settled
-        if started:
+        if not started:
             first = best_trend(numbers, directions, middle, noise)
             differs = min(first.p_value, _apart(flat[0], flat[1:])) < LEVEL
             started = differs and _only_in_the_first(numbers, first.direction)

@@ -7,17 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import (
-    Trend,
-    _Direction,
-    _explained,
-    _gain,
-    _omnibus,
-    _scatter_p,
-    _values,
-    compare_periods,
-    within_periods,
-)
+from sea_ident.discrepancy.trend import Trend, _omnibus, compare_periods, within_periods
 from sea_ident.effects import make_effect
 from sea_ident.recordings import Recording
 
@@ -86,25 +76,6 @@ def test_three_periods_show_no_trend(laboratory):
 # -- synthetic residuals
 
 
-def direction(rng, periods, size, width=2):
-    profile = np.linspace(-1.0, 1.0, periods)
-    columns = rng.standard_normal((size, width)) @ np.array([[1.0, 0.9], [0.0, 0.4]])[:width, :width]
-    basis = np.linalg.qr(columns)[0]
-    return _Direction(make_effect("friction_drift", "hip"), profile, columns, basis, tuple(range(width)), width)
-
-
-def test_size_of_the_test_by_scatter():
-    """Without any trend, but noise that is large and correlated along the columns: 5 % at 5 %."""
-    rng = np.random.default_rng(11)
-    own = direction(rng, 10, 30)
-    mixing = np.array([[30.0, 0.0], [25.0, 4.0]])
-    rejected = 0
-    for _ in range(DRAWS):
-        flat = rng.standard_normal((10, 30)) + rng.standard_normal((10, 2)) @ mixing.T @ own.basis.T
-        rejected += _scatter_p(flat - flat.mean(axis=0), own) < LEVEL
-    assert 0.03 < rejected / DRAWS < 0.07
-
-
 def test_size_of_the_test_of_everything_at_once(nothing_missing):
     rng = np.random.default_rng(12)
     middle = np.arange(10.0)
@@ -113,36 +84,6 @@ def test_size_of_the_test_of_everything_at_once(nothing_missing):
         flat = rng.standard_normal((10, 400))
         rejected += _omnibus(flat - flat.mean(axis=0), middle, nothing_missing[1].noise) < LEVEL
     assert 0.02 < rejected / DRAWS < 0.09
-
-
-def test_power_of_the_test_by_scatter():
-    rng = np.random.default_rng(13)
-    own = direction(rng, 10, 30)
-    trend = np.outer(own.profile, own.columns @ [1.0, 0.0])
-    found = [_scatter_p(rng.standard_normal((10, 30)) + trend, own) for _ in range(50)]
-    assert np.mean(np.array(found) < 1e-3) > 0.9
-
-
-def test_values_and_gain_of_an_exact_trend():
-    rng = np.random.default_rng(14)
-    own = direction(rng, 8, 20)
-    flat = np.outer(own.profile, own.columns @ [2.0, 3.0])
-    np.testing.assert_allclose(_values(flat, own), [2.0, 3.0], rtol=1e-9)
-    assert _gain(flat, own) == pytest.approx(np.sum(flat**2))
-    np.testing.assert_allclose(_explained(flat, [own]), flat, atol=1e-9)
-
-
-def test_one_cause_does_not_change_its_columns_in_opposite_ways():
-    rng = np.random.default_rng(15)
-    own = direction(rng, 8, 20)
-    flat = np.outer(own.profile, own.columns @ [2.0, -3.0])
-    assert _gain(flat, own) == 0.0
-
-
-def test_a_part_of_the_periods_has_a_profile_without_mean():
-    later = direction(np.random.default_rng(16), 8, 20).over(slice(1, None))
-    assert len(later.profile) == 7
-    assert abs(later.profile.sum()) < 1e-12
 
 
 def test_a_drift_within_a_period_is_no_effect_of_its_own(laboratory):
