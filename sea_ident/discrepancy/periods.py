@@ -71,7 +71,10 @@ class Periods:
         data, signals = self.data, signal_effects(fit.effects)
         bodies = tuple(e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia"))
         states = [state for state, _ in self._body_rows(signals, bodies)]
-        torques = [data.tau_motor, *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor)]
+        torques = [
+            data.tau_motor,
+            *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor),
+        ]
         found = []
         for state, torque in zip(states, torques, strict=True):
             channels = {**(state.channels or {}), "tau_motor": torque[:: self._stride]}

@@ -34,6 +34,12 @@ CHANCE = 4.0
 EQUALLY_GOOD = 13.8
 """Two trends between whose gains there is less than this (odds of a thousand) are not told apart."""
 
+SHADOW = 0.1
+"""A trend beside another that explains less than this share of what no trend explains may be a part of that [-]."""
+
+UNEXPLAINED = 0.5
+"""Share of what changes from which on trends that leave it are no explanation of it [-]."""
+
 FEWEST_AFTER_START = 5
 """Periods from which on the first may be left out as start-up."""
 
@@ -133,19 +139,29 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     numbers = numbers @ scatter
     directions = [replace(d, columns=scatter @ d.columns) for d in directions]
     change = _Change(bench, fit)
-    chosen = find_trends(
-        numbers, directions, middle, noise, MOST_TRENDS, LEVEL, lambda d, v: change(d, v) >= SMALLEST_CHANGE
-    )
-    column_p = min((c.p_value for c in chosen), default=1.0)
-    if not chosen:
-        column_p = best_trend(numbers, directions, middle, noise).p_value
-    trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
+
+    def matters(direction: Direction, values: FloatArray) -> bool:
+        return change(direction, values) >= SMALLEST_CHANGE
+
+    chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters)
     whole = {cause.name: cause for cause in causes}
+
     held = held_basis(
         [replace(c.direction, columns=columns.within(whole[c.direction.name])[-len(flat) :]) for c in chosen]
     )
     left = flat if held is None else off(held, flat.ravel()).reshape(flat.shape)
-    return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, _omnibus(left, middle, noise) < LEVEL, notes)
+    unnamed = _omnibus(left, middle, noise) < LEVEL
+    if unnamed and chosen:
+        unexplained = _excess(left, middle)
+        if len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
+            chosen = find_trends(numbers, directions, middle, noise, 1, LEVEL, matters)
+        if unexplained > UNEXPLAINED * _excess(flat, middle):
+            chosen = []
+    column_p = min((c.p_value for c in chosen), default=1.0)
+    if not chosen:
+        column_p = best_trend(numbers, directions, middle, noise).p_value
+    trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
+    return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
 def within_periods(
@@ -198,6 +214,13 @@ def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
     ratio = float(along @ along) / dof
     directions = min(noise_directions(flat), float(dof))
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(flat))))
+
+
+def _excess(flat: FloatArray, middle: FloatArray) -> float:
+    """What the linear trend in everything is beyond the scatter of the periods."""
+    profile = middle - middle.mean()
+    along = profile @ flat / np.linalg.norm(profile)
+    return float(along @ along - np.sum(np.diff(flat, axis=0) ** 2) / (2.0 * (len(flat) - 1)))
 
 
 def _apart(first: FloatArray, later: FloatArray) -> float:

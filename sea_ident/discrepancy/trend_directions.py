@@ -156,8 +156,11 @@ def courses(cause: Cause, columns: FloatArray, middle: FloatArray) -> list[Direc
     Returns:
         The trend with each of its time constants; without those in which nothing changes.
     """
-    constants = time_constants(cause.effect, middle)
-    effects = [replace(cause.effect, time_constant=c) for c in constants] if len(constants) > 1 else [cause.effect]  # type: ignore[call-arg]
+    effects: list[Effect] = [cause.effect]
+    if isinstance(cause.effect, TrendEffect):
+        constants = time_constants(cause.effect, middle)
+        if len(constants) > 1:
+            effects = [replace(cause.effect, time_constant=c) for c in constants]  # type: ignore[call-arg]
     found = [with_course(effect, columns, middle, cause.temperature) for effect in effects]
     return [d for d in found if np.linalg.norm(d.profile) > 1e-12]
 

@@ -73,7 +73,9 @@ def held_basis(held: Sequence[Direction]) -> FloatArray | None:
     """(P M, r) orthonormal basis of trends whose size and course are free, None without any."""
     if not held:
         return None
-    basis, strength, _ = np.linalg.svd(np.concatenate([blocks(d, bends=True) for d in held], axis=1), full_matrices=False)
+    basis, strength, _ = np.linalg.svd(
+        np.concatenate([blocks(d, bends=True) for d in held], axis=1), full_matrices=False
+    )
     return np.asarray(basis[:, strength > SAME * strength[0]], dtype=np.float64)
 
 

@@ -63,7 +63,7 @@ def best_trend(
     """
     basis = held_basis(held)
     names = {d.name for d in held}
-    tried = [Chosen(d, *reversed(gain(periods, d, basis)), 1.0) for d in directions if d.name not in names]
+    tried = [_untested(periods, d, basis) for d in directions if d.name not in names]
     best = max(tried, key=lambda c: c.worth)
     if best.direction.bent:
         best = _refined(periods, best, middle, basis)
@@ -71,6 +71,11 @@ def best_trend(
     by_floor = len(directions) * stats.f.sf(best.gain / len(best.used), len(best.used), max(noise.total_freedom, 4.0))
     by_scatter = families * scatter_p(periods, best.direction.only(best.used), held)
     return replace(best, p_value=min(1.0, float(max(by_floor, by_scatter))))
+
+
+def _untested(periods: FloatArray, direction: Direction, basis: FloatArray | None) -> Chosen:
+    amount, used = gain(periods, direction, basis)
+    return Chosen(direction, used, amount, 1.0)
 
 
 def _refined(periods: FloatArray, start: Chosen, middle: FloatArray, basis: FloatArray | None) -> Chosen:
@@ -85,8 +90,7 @@ def _refined(periods: FloatArray, start: Chosen, middle: FloatArray, basis: Floa
         lambda x: -gain(periods, at(x), basis)[0], bounds=(first - 0.5, first + 0.5), method="bounded",
         options={"xatol": 1e-3},
     )  # fmt: skip
-    refined = at(float(found.x))
-    new = Chosen(refined, *reversed(gain(periods, refined, basis)), 1.0)
+    new = _untested(periods, at(float(found.x)), basis)
     return new if new.gain > start.gain else start
 
 
