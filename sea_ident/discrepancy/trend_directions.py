@@ -12,9 +12,14 @@ from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.discrepancy.trend_values import bend, time_constants
 from sea_ident.effects import Contribution, Effect, effect_classes
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.load import LoadEffect
+from sea_ident.effects.stiffness_drift import StiffnessDrift
 from sea_ident.exceptions import EffectError
 
 Name = tuple[str, str | None]
+
+LOAD_STEP = 1e-4
+"""Share of a stiffness by which the change of a load with it is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +96,18 @@ def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect) -> Contribution:
     """Link and motor rows (N, n, k) of a trend for a change of one; torques of motors are those that were measured."""
     state = bench.state(fit.effects)
     channels = {**(state.channels or {}), "tau_motor": bench.data.tau_motor}
-    return effect.steady(replace(state, channels=channels))
+    rows = effect.steady(replace(state, channels=channels))
+    if not isinstance(effect, StiffnessDrift):
+        return rows
+    # what depends on the load takes it from the stiffness of the model, which is not that of every period
+    motor, counts = rows.motor.copy(), bench.counts(fit.effects)
+    for position, other in enumerate(fit.effects):
+        if isinstance(other, LoadEffect) and other.joint == effect.joint and other.stiffness:
+            step = LOAD_STEP * other.stiffness
+            values = fit.values[sum(counts[:position]) : sum(counts[: position + 1])]
+            stiffer = replace(other, stiffness=other.stiffness + step).evaluate(state)
+            motor += ((stiffer.motor - other.evaluate(state).motor) @ values / step)[:, :, None]
+    return replace(rows, motor=motor)
 
 
 class PeriodColumns:

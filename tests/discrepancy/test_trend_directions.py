@@ -1,5 +1,7 @@
 """Columns of trends: of every period its own, of torques those that were measured, at times of the recording."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -67,3 +69,19 @@ def test_a_rate_of_the_torque_is_told_for_the_start():
     np.testing.assert_allclose(effect.referred(np.array([-a]), -mean), beside_mean, rtol=1e-12)
     other = np.array([1.0, 2.0])
     np.testing.assert_array_equal(make_effect("friction_drift", "knee").referred(other, mean), other)
+
+
+def test_a_softer_spring_carries_less_load_in_what_depends_on_it(softening):
+    """Friction c |load| sgn v takes its load from the model: of K d of the mean, where a period has another K."""
+    bench, fit = softening
+    added = make_effect("load_dependent_friction", "hip")
+    (load,) = bench.anchored((*fit.effects, added), fit.parameters)[-1:]
+    with_it = bench.fit((*fit.effects, load), bench.noise(fit), start=fit.parameters)
+    with_it = replace(with_it, values=np.append(with_it.values[:-1], 0.2))
+    rows = steady_rows(bench, with_it, make_effect("stiffness_drift", "hip"))
+    motion = bench.state(with_it.effects).motion
+    torque = load.spring_load(bench.robot, motion.deflection[:, 0], motion.deflection_rate[:, 0])
+    friction = 0.2 * np.sign(torque) * motion.deflection[:, 0] * load.sign(motion.dtheta[:, 0])
+    away = np.abs(torque) > 0.01 * np.abs(torque).max()
+    np.testing.assert_allclose(rows.motor[away, 0, 0], (motion.deflection[:, 0] + friction)[away], rtol=1e-6, atol=1e-9)
+    np.testing.assert_array_equal(rows.link[:, 0, 0], -motion.deflection[:, 0])
