@@ -1,6 +1,6 @@
 """Which trends there are: chosen one beside the other, exchanged, and kept where each is needed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,10 +36,11 @@ class Chosen:
     gain: float
     p_value: float
 
-    @property
-    def worth(self) -> float:
-        """Gain, less the price of its time constant."""
-        return self.gain - PRICE_OF_A_BEND * self.direction.bent
+    def worth(self, warmed: Collection[str | None]) -> float:
+        """Gain, less the price of a time constant, and of a course in time where there is that of a temperature."""
+        direction = self.direction
+        own_course = direction.effect.name == "friction_drift" and direction.effect.joint in warmed
+        return self.gain - PRICE_OF_A_BEND * (int(direction.bent) + int(own_course))
 
 
 def best_trend(
@@ -64,7 +65,8 @@ def best_trend(
     basis = held_basis(held)
     names = {d.name for d in held}
     tried = [_untested(periods, d, basis) for d in directions if d.name not in names]
-    best = max(tried, key=lambda c: c.worth)
+    warmed = {d.effect.joint for d in directions if d.effect.name == "temperature_friction"}
+    best = max(tried, key=lambda c: c.worth(warmed))
     if best.direction.bent:
         best = _refined(periods, best, middle, basis)
     families = len({d.name for d in directions})

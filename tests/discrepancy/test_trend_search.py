@@ -70,6 +70,19 @@ def test_a_time_constant_is_not_that_of_a_grid():
     assert best.direction.effect.time_constant == pytest.approx(23.7, rel=1e-2)
 
 
+def test_a_measured_temperature_is_preferred_where_a_straight_course_does_as_well():
+    """So weak that the two courses cannot be told apart: of the two, the temperature is the one that was not free."""
+    rng = np.random.default_rng(9)
+    (one,) = axes(1)
+    temperature = 24.0 - 18.0 * np.expm1(-MIDDLE / 40.0)
+    directions = [*trend(one, "hip", "friction_drift"), *trend(one, "hip", "temperature_friction", temperature)]
+    names = [
+        best_trend(noisy(rng, np.outer(0.4 * temperature, one)), directions, MIDDLE, FLOOR).direction.effect.name
+        for _ in range(60)
+    ]
+    assert np.mean([name == "temperature_friction" for name in names]) > 0.9
+
+
 @pytest.mark.parametrize("warms", [True, False])
 def test_a_measured_temperature_says_which_friction_it_is(warms):
     """The same columns: what follows the temperature is its effect, what goes its own way is a drift."""
