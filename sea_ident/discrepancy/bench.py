@@ -15,6 +15,7 @@ from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Parts, Whitening
 from sea_ident.effects import Effect, Side
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.regressor import prior_parameters
 
 MOST_FIT_STEPS = 10
@@ -399,6 +400,10 @@ class Bench(Tangents):
     def period_residuals(self, fit: Fit) -> ComplexArray:
         """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""
         return self._periods.residuals(fit)
+
+    def period_column_changes(self, effect: TrendEffect, fit: Fit) -> ComplexArray:
+        """(P, H + 1, E, k) what the columns of a trend are in every period beyond those of the mean, scaled alike."""
+        return np.asarray(self._periods.column_changes(effect, fit) * fit.scale[:, None], dtype=np.complex128)
 
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor with the parameters of a fit."""

@@ -132,12 +132,13 @@ def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) ->
     names = data.robot.joint_names
     samples = round(data.period * recording.sample_rate)
     # the last whole periods, as the processing takes them
-    count = data.periods * samples
+    count = recording.samples // samples
+    places = list(data.places or range(data.periods))
     out = np.full((data.periods, len(names)), np.nan)
     for i, name in enumerate(names):
-        if recording.has("temperature", name) and recording.samples >= count:
-            values = recording.channel("temperature", [name])[recording.samples - count :, 0]
-            out[:, i] = values.reshape(data.periods, samples).mean(axis=1)
+        if recording.has("temperature", name) and count > max(places):
+            values = recording.channel("temperature", [name])[recording.samples - count * samples :, 0]
+            out[:, i] = values.reshape(count, samples).mean(axis=1)[places]
     return out if np.any(np.isfinite(out)) else None
 
 
@@ -227,7 +228,11 @@ def subset(data: PeriodData, keep: list[int]) -> PeriodData:
     names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
     mean = {name: np.mean([getattr(m, name) for m in motions], axis=0) for name in names}
     motion = type(data.motion)(data.motion.time, **mean)
-    return replace(data, motion=motion, tau_motor=tau.mean(axis=0), period_motions=motions, period_tau_motor=tau)
+    places = data.places or tuple(range(data.periods))
+    return replace(
+        data, motion=motion, tau_motor=tau.mean(axis=0), period_motions=motions, period_tau_motor=tau,
+        places=tuple(places[p] for p in keep),
+    )  # fmt: skip
 
 
 def _currents(data: PeriodData, recording: Recording) -> FloatArray:

@@ -97,6 +97,7 @@ class PeriodData:
         caution: how many times the usual is left out around reversals.
         alike: combinations of samples left out that are weaker than this within the band are not freed [-].
         known: (N, E) torque that is known to act beside the model, None where there is none [N m].
+        places: (P,) number of every period in the recording, from 0, where some were left out; else nothing.
     """
 
     robot: Robot
@@ -115,6 +116,13 @@ class PeriodData:
     caution: int = 1
     alike: float = ALIKE
     known: FloatArray | None = None
+    places: tuple[int, ...] = ()
+
+    @property
+    def starts(self) -> FloatArray:
+        """(P,) time from the start of the recording to that of every period [s]."""
+        places = self.places or range(self.periods)
+        return np.array(places, dtype=np.float64) * self.period
 
     @property
     def periods(self) -> int:
@@ -262,6 +270,7 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         reach=max(processed.link_harmonics, processed.motor_harmonics),
         left_out=around_reversals(processed.motion, equations_of(robot), processed.period_motions),
         warnings=processed.warnings,
+        places=processed.places,
     )
 
 

@@ -95,10 +95,8 @@ def diagnose(
                 stretch = filter_recording(recording, robot)
             return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
     whole = period_data(processed, robot)
-    temperature = check.temperatures(recording, whole)
     data, notes = check.cleaned(whole, recording)
-    if temperature is not None and len(temperature) != data.periods:
-        temperature = None
+    temperature = check.temperatures(recording, data)
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
     basic = completed(bench)

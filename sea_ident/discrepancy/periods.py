@@ -1,6 +1,7 @@
 """The periods of a recording in the light of a model."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
+from sea_ident.effects.drift import TrendEffect
 
 PERIOD_SAMPLES = 2
 """Samples of a single period that its model torque is computed at, per harmonic of its motion."""
@@ -60,6 +62,27 @@ class Periods:
         changes = (np.stack(predicted[1:]) - predicted[0]) * np.sqrt(data.periods)
         targets = np.stack([spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor])
         return np.asarray(fit.scale * (fit.residual + targets - targets.mean(axis=0) - changes), dtype=np.complex128)
+
+    def column_changes(self, effect: TrendEffect, fit: Fit) -> ComplexArray:
+        """(P, H + 1, E, k) what the columns of a trend are in every period beyond those of the mean, unscaled.
+
+        A spring that softens is deflected more and more: the columns of one period are not those of another.
+        """
+        data, signals = self.data, signal_effects(fit.effects)
+        bodies = tuple(e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia"))
+        states = [state for state, _ in self._body_rows(signals, bodies)]
+        torques = [
+            data.tau_motor,
+            *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor),
+        ]
+        found = []
+        for state, torque in zip(states, torques, strict=True):
+            channels = {**(state.channels or {}), "tau_motor": torque[:: self._stride]}
+            part = effect.steady(replace(state, channels=channels))
+            for signal in signals:
+                part = signal.shifted(self.robot, state.motion.time, part)
+            found.append(spectrum(data.rows(part), data.harmonics))
+        return np.asarray((np.stack(found[1:]) - found[0]) * np.sqrt(data.periods), dtype=np.complex128)
 
     def _body_rows(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> list[tuple[State, FloatArray]]:
         """State and rows (N', 2 n, k) of bodies and rotors of the mean, then of every period, at fewer samples."""

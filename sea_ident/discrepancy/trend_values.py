@@ -11,6 +11,9 @@ from sea_ident.effects.drift import TrendEffect
 LOG_STEP = 1e-3
 """Step of the logarithm of a time constant by which the change of a course is told."""
 
+STRAIGHT = 1000.0
+"""Lengths of a recording in a time constant with which a course is straight: to half a thousandth of its change."""
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -18,7 +21,7 @@ class Course:
 
     Attributes:
         profile: (P,) course, without mean.
-        columns: (M, k) whitened columns.
+        columns: (P, M, k) whitened columns of every period.
         bend: (P,) change of the course with the logarithm of its time constant, None where it has none to find.
     """
 
@@ -46,8 +49,8 @@ def time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]
     """Time constants worth trying where the middles of the periods (P,) are these [s]; with the last it is straight."""
     if not any(shape.name == "time_constant" for shape in getattr(effect, "shapes", ())):
         return (getattr(effect, "time_constant", 0.0),)
-    length = float(middle[-1] + middle[0])
-    return tuple(float(c) for c in (*np.geomspace(0.1 * length, 0.8 * length, 13), 20.0 * length))
+    length = float(middle[-1] + 0.5 * np.median(np.diff(middle)))
+    return tuple(float(c) for c in (*np.geomspace(0.1 * length, 3.0 * length, 13), STRAIGHT * length))
 
 
 def bend(effect: TrendEffect, middle: FloatArray, temperature: FloatArray | None) -> FloatArray:
@@ -76,31 +79,40 @@ def course_values(flat: FloatArray, courses: Sequence[Course]) -> list[CourseVal
     Returns:
         Values and standard deviations, trend by trend.
     """
-    columns = [np.multiply.outer(c.profile, x) for c in courses for x in c.columns.T]
+    columns = np.concatenate([times_course(c.columns, c.profile) for c in courses], axis=1)
     amounts = _pinv(columns) @ flat.ravel()
-    ends = np.cumsum([c.columns.shape[1] for c in courses])
+    ends = np.cumsum([c.columns.shape[2] for c in courses])
     parts = np.split(amounts, ends[:-1])
     bends = [
-        np.multiply.outer(c.bend, c.columns @ v) for c, v in zip(courses, parts, strict=True) if c.bend is not None
+        (times_course(c.columns, c.bend) @ v)[:, None]
+        for c, v in zip(courses, parts, strict=True)
+        if c.bend is not None
     ]
-    inverse = _pinv([*columns, *bends]).reshape(len(columns) + len(bends), *flat.shape)
-    explained = np.tensordot(amounts, np.stack(columns), axes=1)
+    count = columns.shape[1]
+    inverse = _pinv(np.concatenate([columns, *bends], axis=1)).reshape(count + len(bends), *flat.shape)
+    explained = (columns @ amounts).reshape(flat.shape)
     # the mean and every course that differs take a degree of freedom of each number of a period
     used = 1 + np.linalg.matrix_rank(np.stack([p for c in courses for p in (c.profile, c.bend) if p is not None]))
     left = (flat - explained) / np.sqrt(max(len(flat) - used, 1))
     scatter = np.sum(np.square(inverse @ left.T), axis=(1, 2))
     floor = np.sum(np.square(inverse), axis=(1, 2))
     stds = np.sqrt(np.maximum(scatter, floor))
-    bend_stds = iter(stds[len(columns) :])
+    bend_stds = iter(stds[count:])
     return [
         CourseValues(v, s, 0.0 if c.bend is None else float(next(bend_stds)))
-        for c, v, s in zip(courses, parts, np.split(stds[: len(columns)], ends[:-1]), strict=True)
+        for c, v, s in zip(courses, parts, np.split(stds[:count], ends[:-1]), strict=True)
     ]
 
 
-def _pinv(columns: Sequence[FloatArray]) -> FloatArray:
-    """(K, P M) inverse of columns (P, M)."""
-    matrix = np.stack([c.ravel() for c in columns], axis=1)
+def times_course(columns: FloatArray, course: FloatArray) -> FloatArray:
+    """(P M, k) columns (P, M, k) of every period times a course (P,), without their mean over the periods."""
+    found: FloatArray = columns * course[:, None, None]
+    found -= found.mean(axis=0)
+    return found.reshape(-1, columns.shape[2])
+
+
+def _pinv(matrix: FloatArray) -> FloatArray:
+    """(k, P M) inverse of columns (P M, k)."""
     norms = np.linalg.norm(matrix, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
     inverse: FloatArray = np.linalg.pinv(matrix / scale, rcond=1e-10) / scale[:, None]

@@ -29,6 +29,10 @@ class TrendEffect(ABC):
     def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
         """Change at the times (P,) [s], with the temperatures (P,) of its joint where they are measured [degC]."""
 
+    def referred(self, values: FloatArray, change: float) -> FloatArray:
+        """Values (k,) for columns of a time at which less has changed, by `change`: where columns drift themselves."""
+        return values
+
 
 def warming(time: FloatArray, time_constant: float) -> FloatArray:
     """Change at the times (any shape) [s] that starts at a rate of one per minute and ends with a time constant.

@@ -42,19 +42,24 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
         return state.at(self.side, self.at, column[:, None])
 
     def steady(self, state: State) -> Contribution:
-        """Motor torque."""
-        return state.at(self.side, self.at, self.motor_torque(state)[:, None])
+        """Motor torque: as it was measured where it was, for a model that lacks something does not have it all."""
+        measured = None if state.channels is None else state.channels.get("tau_motor")
+        torque = self.motor_torque(state) if measured is None else measured[:, state.robot.index(self.at)]
+        return state.at(self.side, self.at, torque[:, None])
 
     def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
         """The drift."""
         return warming(time, self.time_constant)
+
+    def referred(self, values: FloatArray, change: float) -> FloatArray:
+        """The measured torque drifts as the constant does: it is another share of what was measured before."""
+        return np.asarray(values / (1.0 + values * change), dtype=np.float64)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The part of the commanded torque that is lost."""
         i = robot.index(self.at)
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            share = float(values[0]) * float(warming(np.array(state.time), self.time_constant))
-            motor[i] += state.tau_motor[i] * share / (1.0 + share)
+            motor[i] += state.tau_motor[i] * float(values[0]) * float(warming(np.array(state.time), self.time_constant))
 
         return act

@@ -13,13 +13,12 @@ def course(rng, width=2, bent=False):
     time = np.arange(PERIODS) + 0.5
     profile = time - time.mean()
     square = -0.5 * time**2 / PERIODS
-    return Course(
-        profile / PERIODS, rng.standard_normal((NUMBERS, width)), (square - square.mean()) / PERIODS if bent else None
-    )
+    columns = np.broadcast_to(rng.standard_normal((NUMBERS, width)), (PERIODS, NUMBERS, width))
+    return Course(profile / PERIODS, columns, (square - square.mean()) / PERIODS if bent else None)
 
 
 def put(courses, values):
-    return sum(np.outer(c.profile, c.columns @ v) for c, v in zip(courses, values, strict=True))
+    return sum(c.profile[:, None] * (c.columns @ v) for c, v in zip(courses, values, strict=True))
 
 
 def centred(flat):
@@ -30,7 +29,7 @@ def test_trends_that_overlap_are_told_apart_exactly():
     rng = np.random.default_rng(0)
     one = course(rng)
     # much alike in the columns, and the same course
-    other = Course(one.profile, one.columns + 0.5 * rng.standard_normal(one.columns.shape))
+    other = Course(one.profile, one.columns + 0.5 * rng.standard_normal(one.columns.shape[1:]))
     found = course_values(put([one, other], [[2.0, -1.0], [0.5, 3.0]]), [one, other])
     np.testing.assert_allclose([f.values for f in found], [[2.0, -1.0], [0.5, 3.0]], rtol=1e-9)
 
@@ -43,7 +42,7 @@ def test_deviations_are_what_is_stated(extra):
     scores = []
     for _ in range(DRAWS):
         noise = rng.standard_normal((PERIODS, NUMBERS))
-        noise += extra * rng.standard_normal((PERIODS, 2)) @ courses[0].columns.T / np.sqrt(NUMBERS) * 3.0
+        noise += extra * rng.standard_normal((PERIODS, 2)) @ courses[0].columns[0].T / np.sqrt(NUMBERS) * 3.0
         found = course_values(centred(put(courses, truth) + noise), courses)
         scores.append(np.concatenate([(f.values - v) / f.stds for f, v in zip(found, truth, strict=True)]))
     rms = np.sqrt(np.mean(np.square(scores), axis=0))
@@ -77,5 +76,5 @@ def test_time_constants_end_with_a_straight_course():
     middle = np.arange(12) * 5.0 + 2.5
     found = time_constants(make_effect("friction_drift", "hip"), middle)
     assert found[0] == pytest.approx(6.0)
-    assert found[-1] == pytest.approx(1200.0)
+    assert found[-1] == pytest.approx(6e4)
     assert time_constants(make_effect("temperature_friction", "hip"), middle) == (100.0,)

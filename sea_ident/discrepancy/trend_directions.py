@@ -1,0 +1,208 @@
+"""Every trend of the library as columns times a course over the periods."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.discrepancy.trend_values import bend, time_constants
+from sea_ident.effects import Contribution, Effect, effect_classes
+from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.load import LoadEffect
+from sea_ident.effects.stiffness_drift import StiffnessDrift
+from sea_ident.exceptions import EffectError
+
+Name = tuple[str, str | None]
+
+LOAD_STEP = 1e-4
+"""Share of a stiffness by which the change of a load with it is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """A trend without a course.
+
+    Attributes:
+        effect: the effect.
+        columns: (M, k) its whitened columns in the mean period.
+        temperature: (P,) of its joint [degC], None where it was not measured or does not matter.
+    """
+
+    effect: Effect
+    columns: FloatArray
+    temperature: FloatArray | None
+
+    @property
+    def name(self) -> Name:
+        """Effect and joint."""
+        return self.effect.name, self.effect.joint
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """A trend with one course.
+
+    Attributes:
+        effect: the effect, with the time constant of the course.
+        profile: (P,) course, without mean.
+        columns: (P, M, k) whitened columns of every period.
+        bend: (P,) change of the course with the logarithm of its time constant, None where it has none.
+        bent: whether a time constant was chosen, against a straight course.
+        level: mean of the course.
+    """
+
+    effect: Effect
+    profile: FloatArray
+    columns: FloatArray
+    bend: FloatArray | None = None
+    bent: bool = False
+    level: float = 0.0
+
+    @property
+    def name(self) -> Name:
+        """Effect and joint."""
+        return self.effect.name, self.effect.joint
+
+    def only(self, used: tuple[int, ...]) -> "Direction":
+        """The same with some of its columns."""
+        return replace(self, columns=self.columns[:, :, list(used)])
+
+    def over(self, periods: slice) -> "Direction":
+        """The same in a part of the periods."""
+        profile, bent = self.profile[periods], None if self.bend is None else self.bend[periods]
+        return replace(
+            self,
+            profile=profile - profile.mean(),
+            level=self.level + float(profile.mean()),
+            columns=self.columns[periods],
+            bend=None if bent is None else bent - bent.mean(),
+        )
+
+
+def trend_effects(bench: Bench) -> list[Effect]:
+    """Every trend of the library at every joint."""
+    found: list[Effect] = []
+    for _, kind in sorted(effect_classes().items()):
+        if issubclass(kind, TrendEffect):
+            found.extend(kind.instances(bench.robot))
+    return found
+
+
+def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect) -> Contribution:
+    """Link and motor rows (N, n, k) of a trend for a change of one; torques of motors are those that were measured."""
+    state = bench.state(fit.effects)
+    channels = {**(state.channels or {}), "tau_motor": bench.data.tau_motor}
+    rows = effect.steady(replace(state, channels=channels))
+    if not isinstance(effect, StiffnessDrift):
+        return rows
+    # what depends on the load takes it from the stiffness of the model, which is not that of every period
+    motor, counts = rows.motor.copy(), bench.counts(fit.effects)
+    for position, other in enumerate(fit.effects):
+        if isinstance(other, LoadEffect) and other.joint == effect.joint and other.stiffness:
+            step = LOAD_STEP * other.stiffness
+            values = fit.values[sum(counts[:position]) : sum(counts[: position + 1])]
+            stiffer = replace(other, stiffness=other.stiffness + step).evaluate(state)
+            motor += ((stiffer.motor - other.evaluate(state).motor) @ values / step)[:, :, None]
+    return replace(rows, motor=motor)
+
+
+class PeriodColumns:
+    """Columns of trends in the periods of a recording.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        whitener: (H + 1, E, E) of one period.
+        free: (M, m) orthonormal basis of the samples that are left out, whitened.
+    """
+
+    def __init__(self, bench: Bench, fit: Fit, whitener: ComplexArray, free: FloatArray) -> None:
+        self._bench, self._fit, self._whitener, self._free = bench, fit, whitener, free
+
+    def causes(self, temperature: FloatArray | None) -> list[Cause]:
+        """Every trend of the library that shows in anything.
+
+        Args:
+            temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+
+        Returns:
+            The trends.
+        """
+        bench, fit = self._bench, self._fit
+        found: list[Cause] = []
+        for plain in trend_effects(bench):
+            effect = bench.anchored((*fit.effects, plain), fit.parameters)[-1]
+            if not isinstance(effect, TrendEffect):
+                continue
+            own = None
+            if temperature is not None and effect.joint is not None:
+                own = temperature[:, bench.robot.index(effect.joint)]
+                own = own if np.all(np.isfinite(own)) else None
+            try:
+                effect.change(np.zeros(bench.data.periods), own)
+                spectra = bench.spectra_of(steady_rows(bench, fit, effect), fit.effects) * fit.scale[:, None]
+            except EffectError:
+                continue
+            columns = off(self._free, whiten(self._whitener, spectra))
+            if np.all(np.linalg.norm(columns, axis=0) > 0.0):
+                found.append(Cause(effect, columns, own))
+        return found
+
+    def within(self, cause: Cause, space: FloatArray | None = None) -> FloatArray:
+        """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""
+        if not isinstance(cause.effect, TrendEffect):
+            raise TypeError(f"{cause.effect.name} is no trend")
+        changes = self._bench.period_column_changes(cause.effect, self._fit)
+        each = [cause.columns + off(self._free, whiten(self._whitener, change)) for change in changes]
+        return np.stack(each if space is None else [space.T @ columns for columns in each])
+
+
+def courses(cause: Cause, columns: FloatArray, middle: FloatArray) -> list[Direction]:
+    """A trend in every course that is tried.
+
+    Args:
+        cause: the trend.
+        columns: (P, M, k) its columns in every period.
+        middle: (P,) middles of the periods [s].
+
+    Returns:
+        The trend with each of its time constants; without those in which nothing changes.
+    """
+    effects: list[Effect] = [cause.effect]
+    if isinstance(cause.effect, TrendEffect):
+        constants = time_constants(cause.effect, middle)
+        if len(constants) > 1:
+            effects = [replace(cause.effect, time_constant=c) for c in constants]  # type: ignore[call-arg]
+    found = [with_course(effect, columns, middle, cause.temperature) for effect in effects]
+    return [d for d in found if np.linalg.norm(d.profile) > 1e-12]
+
+
+def with_course(
+    effect: Effect, columns: FloatArray, middle: FloatArray, temperature: FloatArray | None = None
+) -> Direction:
+    """A trend in the course that its time constant gives it.
+
+    Args:
+        effect: the trend.
+        columns: (P, M, k) whitened columns of every period.
+        middle: (P,) middles of the periods [s].
+        temperature: (P,) of its joint [degC], None where it was not measured.
+
+    Returns:
+        The direction.
+
+    Raises:
+        TypeError: the effect is no trend.
+    """
+    if not isinstance(effect, TrendEffect):
+        raise TypeError(f"{effect.name} is no trend")
+    change, constants = effect.change(middle, temperature), time_constants(effect, middle)
+    level = float(change.mean())
+    if len(constants) == 1:
+        return Direction(effect, change - level, columns, level=level)
+    bent = effect.time_constant < constants[-1]  # type: ignore[attr-defined]
+    return Direction(effect, change - level, columns, bend(effect, middle, temperature), bent, level)

@@ -1,0 +1,119 @@
+"""Which trends are chosen: beside each other, straight where nothing speaks for a bend, by what was measured."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.trend_directions import Cause, courses
+from sea_ident.discrepancy.trend_search import alike, best_trend, find_trends
+from sea_ident.effects import make_effect
+
+PERIODS, NUMBERS = 20, 12
+MIDDLE = 5.0 * (np.arange(PERIODS) + 0.5)
+FLOOR = NoiseFloor(np.ones((2, 1, 1), dtype=complex), PERIODS, 1e4, 1e4)
+
+
+def trend(columns, joint, kind="stiffness_drift", temperature=None):
+    """All courses of a trend with columns (M,)."""
+    each = np.broadcast_to(columns[:, None], (PERIODS, NUMBERS, 1))
+    return courses(Cause(make_effect(kind, joint), columns[:, None], temperature), each, MIDDLE)
+
+
+def axes(count):
+    return np.linalg.qr(np.random.default_rng(3).standard_normal((NUMBERS, count)))[0].T
+
+
+def noisy(rng, *parts):
+    flat = rng.standard_normal((PERIODS, NUMBERS)) + sum(parts)
+    return flat - flat.mean(axis=0)
+
+
+def found(flat, directions):
+    chosen = find_trends(flat, directions, MIDDLE, FLOOR, 2, 1e-3, lambda d, v: True)
+    return {c.direction.name for c in chosen}
+
+
+def test_what_two_trends_share_is_exchanged_for_them():
+    """The third looks like the sum of the two: alone it explains most, and it is neither."""
+    one, other, third = axes(3)
+    mixed = (one + other + 0.3 * third) / np.sqrt(2.09)
+    directions = [*trend(one, "hip"), *trend(other, "knee"), *trend(mixed, "ankle")]
+    flat = noisy(np.random.default_rng(4), *(np.outer(0.8 * MIDDLE, c) for c in (one, other)))
+    assert best_trend(flat, directions, MIDDLE, FLOOR).direction.effect.joint == "ankle"
+    assert found(flat, directions) == {("stiffness_drift", "hip"), ("stiffness_drift", "knee")}
+
+
+def test_a_second_trend_is_not_what_the_course_of_the_first_leaves():
+    """A strong one of another course than any of the library's, beside columns that are much like its own."""
+    one, third = axes(2)
+    directions = [*trend(one, "hip"), *trend(one + 0.3 * third, "knee")]
+    course = MIDDLE - 2e-3 * (MIDDLE - 50.0) ** 2
+    flat = noisy(np.random.default_rng(5), np.outer(20.0 * course, one))
+    assert found(flat, directions) == {("stiffness_drift", "hip")}
+
+
+def test_a_straight_trend_is_called_straight():
+    rng = np.random.default_rng(6)
+    (one,) = axes(1)
+    directions = trend(one, "hip")
+    bent = [
+        best_trend(noisy(rng, np.outer(0.5 * MIDDLE, one)), directions, MIDDLE, FLOOR).direction.bent
+        for _ in range(100)
+    ]
+    assert np.mean(bent) < 0.06
+
+
+def test_a_time_constant_is_not_that_of_a_grid():
+    (one,) = axes(1)
+    best = best_trend(np.outer(-1e3 * np.expm1(-MIDDLE / 23.7), one), trend(one, "hip"), MIDDLE, FLOOR)
+    assert best.direction.bent
+    assert best.direction.effect.time_constant == pytest.approx(23.7, rel=1e-2)
+
+
+def test_a_measured_temperature_is_preferred_where_a_straight_course_does_as_well():
+    """So weak that the two courses cannot be told apart: of the two, the temperature is the one that was not free."""
+    rng = np.random.default_rng(9)
+    (one,) = axes(1)
+    temperature = 24.0 - 18.0 * np.expm1(-MIDDLE / 40.0)
+    directions = [*trend(one, "hip", "friction_drift"), *trend(one, "hip", "temperature_friction", temperature)]
+    names = [
+        best_trend(noisy(rng, np.outer(0.4 * temperature, one)), directions, MIDDLE, FLOOR).direction.effect.name
+        for _ in range(60)
+    ]
+    assert np.mean([name == "temperature_friction" for name in names]) > 0.9
+
+
+@pytest.mark.parametrize("warms", [True, False])
+def test_a_measured_temperature_says_which_friction_it_is(warms):
+    """The same columns: what follows the temperature is its effect, what goes its own way is a drift."""
+    rng = np.random.default_rng(7)
+    (one,) = axes(1)
+    temperature = 24.0 - 18.0 * np.expm1(-MIDDLE / 40.0)
+    directions = [
+        *trend(one, "hip", "friction_drift"),
+        *trend(one, "hip", "temperature_friction", temperature),
+    ]
+    course = temperature if warms else 0.3 * MIDDLE
+    expected = "temperature_friction" if warms else "friction_drift"
+    names = [
+        best_trend(noisy(rng, np.outer(5.0 * course, one)), directions, MIDDLE, FLOOR).direction.effect.name
+        for _ in range(60)
+    ]
+    assert np.mean([name == expected for name in names]) > 0.95
+
+
+def test_names_by_chance_are_rare():
+    """Nine trends in white noise: the probability that is stated."""
+    rng = np.random.default_rng(8)
+    directions = [d for k, c in enumerate(axes(9)) for d in trend(c, f"joint{k}")]
+    p_values = np.array([best_trend(noisy(rng), directions, MIDDLE, FLOOR).p_value for _ in range(100)])
+    assert np.mean(p_values < 0.05) < 0.1
+
+
+def test_share_that_another_explains():
+    """Columns at 60 degrees: a quarter."""
+    one, other = axes(2)
+    near = 0.5 * one + np.sqrt(0.75) * other
+    flat = np.outer(MIDDLE - MIDDLE.mean(), one)
+    share = alike(flat, trend(one, "hip")[-1], trend(near, "knee")[-1], None)
+    assert share == pytest.approx(0.25, rel=1e-6)
