@@ -96,35 +96,6 @@ def columns_match(robot: Robot, recording: Recording | ProcessedRecording) -> No
         )
 
 
-def not_the_same(recording: Recording | ProcessedRecording, holdout: Recording | ProcessedRecording) -> None:
-    """Refuse the same data given twice.
-
-    Raises:
-        DiagnosisError: they are the same, or one holds the other.
-    """
-    first, second = _fingerprint(recording), _fingerprint(holdout)
-    if first is None or second is None:
-        return
-    short, long = sorted((first, second), key=len)
-    rows = {row.tobytes() for row in long}
-    common = sum(row.tobytes() in rows for row in short)
-    if common > 0.5 * len(short):
-        raise DiagnosisError(
-            f"the held-out recording {holdout.source} is the recording {recording.source} itself ({common} of "
-            f"{len(short)} samples are the same): it proves nothing. Record another motion, or leave it out"
-        )
-
-
-def _fingerprint(recording: Recording | ProcessedRecording) -> FloatArray | None:
-    if isinstance(recording, ProcessedRecording):
-        values = np.concatenate([np.asarray(recording.period_tau_motor).reshape(-1, len(recording.joint_names))])
-    else:
-        names = [n for n in recording.columns if n.startswith(("tau_motor_", "current_", "q_", "theta_"))]
-        names = [n for n in names if "_reference_" not in n]
-        values = np.stack([recording.columns[n] for n in sorted(names)], axis=1)
-    return np.ascontiguousarray(values) if len(values) else None
-
-
 def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) -> FloatArray | None:
     """(P, n) mean temperature of every period [degC], NaN at joints where it was not measured; None without any."""
     if isinstance(recording, ProcessedRecording):

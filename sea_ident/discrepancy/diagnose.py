@@ -23,6 +23,7 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
@@ -80,7 +81,7 @@ def diagnose(
     check.columns_match(robot, recording)
     if holdout is not None:
         check.columns_match(robot, holdout)
-        check.not_the_same(recording, holdout)
+        not_the_same(recording, holdout)
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         processed = wide_processing(recording, robot, period or _period_of(model, recording))

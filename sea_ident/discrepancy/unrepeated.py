@@ -29,7 +29,7 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
-from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, find_pushes, pushed
+from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, chance, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import FAMILY_LEVEL
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -273,7 +273,7 @@ def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[P
         own = [p for p in pushes if p.joint == i]
         if not own:
             continue
-        strongest = max(own, key=lambda p: abs(p.force))
+        strongest = max(own, key=lambda p: p.z)
         stem = f"{joint}.external_force"
         interval = processed.interval
         out.append(
@@ -293,17 +293,12 @@ def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[P
                     ),
                 ),
                 torque_share=float(abs(strongest.force) / max(rms[i], 1e-300)),
-                p_value=_tail(min(p.z for p in own), processed.samples),
+                p_value=chance(strongest.z, processed.samples),
                 alternatives=(),
                 detail=make_effect("external_force", joint, start=strongest.start, stop=strongest.stop),
             )
         )
     return out
-
-
-def _tail(z: float, samples: int) -> float:
-    """Probability of such a departure in so many samples if its tails are as heavy as exponential ones."""
-    return float(min(1.0, samples * np.exp(-z * np.log(2.0) / 0.6745)))
 
 
 def _verdict(missing: list[MissingEffect]) -> Verdict:
