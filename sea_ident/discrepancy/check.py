@@ -96,6 +96,40 @@ def columns_match(robot: Robot, recording: Recording | ProcessedRecording) -> No
         )
 
 
+def torque_units(robot: Robot) -> dict[str, str]:
+    """Unit of the torque of each joint."""
+    return {joint.name: joint.torque_unit for joint in robot.joints}
+
+
+def channels_move(robot: Robot, recording: Recording | ProcessedRecording) -> None:
+    """Refuse a recording in which a joint does not move or its torque is not measured: it spoils what is said of all.
+
+    Raises:
+        DiagnosisError: a column stays at one value.
+    """
+    if isinstance(recording, ProcessedRecording):
+        return
+    for joint in robot.joints:
+        name = joint.name
+        kinds = ["q", *(["theta"] if joint.elastic else []), "tau_motor"]
+        if not recording.has("tau_motor", name):
+            kinds[-1] = "current"
+        for kind in kinds:
+            if not recording.has(kind, name) or recording.samples < 2:
+                continue
+            values = recording.columns[f"{kind}_{name}"]
+            if np.ptp(values) > 0.0:
+                continue
+            what = "no torque is measured"
+            if kind in ("q", "theta"):
+                what = "the sensor is dead, or the joint does not move"
+            raise DiagnosisError(
+                f"{recording.source}: column {kind}_{name} is constant, {values[0]:g}: {what}, and nothing can be "
+                f"told. Record it, or identify and diagnose a model without {name!r} (joints, on the command "
+                "line --joints)"
+            )
+
+
 def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) -> FloatArray | None:
     """(P, n) mean temperature of every period [degC], NaN at joints where it was not measured; None without any."""
     if isinstance(recording, ProcessedRecording):
@@ -148,7 +182,7 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
     for i in np.flatnonzero(share > 0.0):
         name = data.robot.joint_names[int(i)]
         warnings.append(
-            f"{data.source}: the torque or current of {name!r} stays at its largest value for {100 * share[i]:.2g} % "
+            f"{data.source}: the torque or current of {name!r} stays at its largest value for {share[i]:.1%} "
             "of the time: it is clipped. These samples were left out; record with less torque"
         )
         fatal = fatal or bool(share[i] > CLIPPED_SHARE)

@@ -108,8 +108,9 @@ def conclude(
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
-        units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
+        units=check.torque_units(bench.robot),
         other_motion=held is not None and held.other_motion,
+        sound=not notes.fatal,
     )  # fmt: skip
     found = Diagnosis(
         verdict=verdict,

@@ -78,9 +78,11 @@ def diagnose(
     tell("reading the periods", 0.0)
     robot = model.robot
     check.models_match(model, reference)
-    check.columns_match(robot, recording)
+    for given in (recording, holdout):
+        if given is not None:
+            check.columns_match(robot, given)
+            check.channels_move(robot, given)
     if holdout is not None:
-        check.columns_match(robot, holdout)
         not_the_same(recording, holdout)
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
@@ -127,6 +129,7 @@ def diagnose(
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
+    diagnosis = replace(diagnosis, units=check.torque_units(robot))
     tell("done", 1.0)
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)

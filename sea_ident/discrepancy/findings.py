@@ -26,6 +26,15 @@ class Verdict(StrEnum):
     CANNOT_TELL = "cannot_tell"
 
 
+SMALLEST = 1e-300
+"""Probability that is not told from zero."""
+
+
+def chance(p_value: float) -> str:
+    """A probability, to be read behind the letter p."""
+    return f"= {p_value:.2g}" if p_value > SMALLEST else f"< {SMALLEST:g}"
+
+
 @dataclass(frozen=True)
 class LackOfFit:
     """Whether the model leaves more than noise.

@@ -185,7 +185,7 @@ def _runs(
         z = float(abs(smooth[peak]) / spread)
         moving = length - interval * np.count_nonzero(slow[span])
         if chance(z, len(time)) < CHANCE:
-            clear = clear or not reversing[peak] or moving >= CLEAR_AT_REVERSAL
+            clear = bool(clear or not reversing[peak] or moving >= CLEAR_AT_REVERSAL)
         found.append(
             Push(
                 joint, float(time[begin]), float(time[end]), float(smooth[peak]),

@@ -17,6 +17,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, circular
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.candidates import Candidate, candidate_effects, scan
+from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
@@ -167,6 +168,7 @@ def diagnose_unrepeated(
         warnings=tuple(dict.fromkeys(notes)),
         model=repaired,
         recording=processed.source,
+        units=torque_units(robot),
     )  # fmt: skip
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
