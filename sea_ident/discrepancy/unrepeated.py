@@ -153,7 +153,7 @@ def diagnose_unrepeated(
     repaired = None if pushes else repaired_model(model, processed, now.fit)
     diagnosis = Diagnosis(
         verdict=verdict,
-        text=_text(robot.joint_names, verdict, missing, gap, pushes, found),
+        text=_text(robot, verdict, missing, gap, pushes, found),
         lack_of_fit=LackOfFit(0.0, 0, 1.0, 1.0, {joint: {} for joint in robot.joint_names}),
         locations=tuple(
             Location(
@@ -327,7 +327,7 @@ def _gap(bench: StretchBench, before: Fit, after: Fit, pushes: tuple[Push, ...])
 
 
 def _text(
-    joints: tuple[str, ...],
+    robot: Robot,
     verdict: Verdict,
     missing: list[MissingEffect],
     gap: Gap,
@@ -342,7 +342,7 @@ def _text(
         )
     for m in missing:
         if m.effect == "external_force":
-            own = [p for p in pushes if joints[p.joint] == m.joint]
+            own = [p for p in pushes if robot.joint_names[p.joint] == m.joint]
             times = ", ".join(f"{p.start:.3f}" for p in own[:6])
             more = f" and {len(own) - 6} more" if len(own) > 6 else ""
             parts.append(
@@ -357,8 +357,8 @@ def _text(
             f"{item.better} of {BLOCKS} blocks are predicted better, {100 * item.gain:.0f} % less squared error."
         )
     parts.extend(
-        f"{joint}: {gap.after[joint]:.3g} (rms) is left beyond a fast part of {gap.noise[joint]:.2g}; slow noise and "
-        "missing effects cannot be told apart in it."
-        for joint in joints
+        f"{joint.name}: {gap.after[joint.name]:.3g} {joint.torque_unit} rms is left beyond a fast part of "
+        f"{gap.noise[joint.name]:.2g} {joint.torque_unit}; slow noise and missing effects cannot be told apart in it."
+        for joint in robot.joints
     )
     return " ".join(parts)
