@@ -182,7 +182,7 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
     for i in np.flatnonzero(share > 0.0):
         name = data.robot.joint_names[int(i)]
         warnings.append(
-            f"{data.source}: the torque or current of {name!r} stays at its largest value for {share[i]:.1%} "
+            f"{data.source}: the torque or current of {name!r} stays at its largest value for {100 * share[i]:.3g} % "
             "of the time: it is clipped. These samples were left out; record with less torque"
         )
         fatal = fatal or bool(share[i] > CLIPPED_SHARE)

@@ -21,7 +21,7 @@ from sea_ident.discrepancy.findings import (
     Waveforms,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.gap import gap_of, torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
@@ -98,7 +98,7 @@ def conclude(
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     holds = held_gap is None or explains(gap, held_gap)
     sound = notes
-    notes = check.drowned(notes, gap, _torque_by_joint(bench))
+    notes = check.drowned(notes, gap, torque_by_joint(bench))
     lost = notes is not sound
     if lost:
         remainder = 0.0
@@ -153,14 +153,6 @@ def explains(training: Gap, held: Gap) -> bool:
     """Whether a gap that goes on one recording goes on the other too, where it is far beyond the noise."""
     left, noise = (float(np.linalg.norm(list(part.values()))) for part in (held.after, held.noise))
     return left < FAR_BEYOND * noise or training.shrink < GOES or held.shrink > STAYS * training.shrink
-
-
-def _torque_by_joint(bench: Bench) -> dict[str, float]:
-    """Largest rms torque of the equations of each joint [N m] or [N]."""
-    found: dict[str, float] = {}
-    for equation, rms in zip(bench.data.equations, bench.torque_rms, strict=True):
-        found[equation.joint] = max(found.get(equation.joint, 0.0), float(rms))
-    return found
 
 
 def verdict_of(

@@ -74,7 +74,7 @@ def test_no_friction_stays_below_zero_by_however_little(model, value):
     values = model.values.copy()
     values[model.names.index("ankle.coulomb_friction")] = value
     found = physical_parameters(replace(model, values=values))
-    assert 0.0 <= found.named()["ankle.coulomb_friction"] < 1e-6
+    assert 0.0 <= found.named()["ankle.coulomb_friction"] < 1e-3
 
 
 def test_negative_friction_becomes_zero(model):
