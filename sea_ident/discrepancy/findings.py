@@ -1,13 +1,16 @@
 """The parts of a diagnosis."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.atomic import atomic_file
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
@@ -209,6 +212,15 @@ class NextExperiment:
     separates: tuple[str, str]
     excitation: Mapping[str, Any]
     gain: float
+
+    def save(self, path: str | Path) -> None:
+        """Write the excitation as `excite` does; `read_excitation` reads it.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        with atomic_file(path) as temporary:
+            temporary.write_text(json.dumps(dict(self.excitation), indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,9 +51,13 @@ def paragraph(facts: Facts) -> str:
     """One paragraph that a person can act on."""
     parts = [_opening(facts)]
     if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
-        parts.append(_gap_sentence(facts.gap, facts.units))
-        if facts.held is not None:
-            parts.append(_held_sentence(facts))
+        drifting = {(t.effect.name, t.effect.joint) for t in facts.trend.trends}
+        if all((m.effect, m.joint) in drifting for m in facts.missing):
+            parts.append("It shows in the comparison of the periods; the mean over all of them hides it.")
+        else:
+            parts.append(_gap_sentence(facts.gap, facts.units))
+            if facts.held is not None:
+                parts.append(_held_sentence(facts))
     if facts.remainder > 0.0:
         parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
     if facts.verdict is Verdict.SUSPECT:
