@@ -1,5 +1,6 @@
 """What a search, its confirmation and the held-out data add up to: the verdict and its evidence."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -97,6 +98,8 @@ def conclude(
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     holds = held_gap is None or explains(gap, held_gap)
+    if held is not None and held_gap is not None:
+        holds = holds and predicts(held_gap, torque_by_joint(held.bench))
     sound = notes
     notes = check.drowned(notes, gap, torque_by_joint(bench))
     lost = notes is not sound
@@ -153,6 +156,14 @@ def explains(training: Gap, held: Gap) -> bool:
     """Whether a gap that goes on one recording goes on the other too, where it is far beyond the noise."""
     left, noise = (float(np.linalg.norm(list(part.values()))) for part in (held.after, held.noise))
     return left < FAR_BEYOND * noise or training.shrink < GOES or held.shrink > STAYS * training.shrink
+
+
+def predicts(held: Gap, torque: Mapping[str, float]) -> bool:
+    """Whether a model is better than none on other data: what it leaves is less than the rms torque by joint.
+
+    Wrong units, exchanged joints or another robot leave more.
+    """
+    return all(left <= torque[joint] for joint, left in held.after.items())
 
 
 def verdict_of(
