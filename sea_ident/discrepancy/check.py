@@ -96,33 +96,38 @@ def columns_match(robot: Robot, recording: Recording | ProcessedRecording) -> No
         )
 
 
-def not_the_same(recording: Recording | ProcessedRecording, holdout: Recording | ProcessedRecording) -> None:
-    """Refuse the same data given twice.
+def torque_units(robot: Robot) -> dict[str, str]:
+    """Unit of the torque of each joint."""
+    return {joint.name: joint.torque_unit for joint in robot.joints}
+
+
+def channels_move(robot: Robot, recording: Recording | ProcessedRecording) -> None:
+    """Refuse a recording in which a joint does not move or its torque is not measured: it spoils what is said of all.
 
     Raises:
-        DiagnosisError: they are the same, or one holds the other.
+        DiagnosisError: a column stays at one value.
     """
-    first, second = _fingerprint(recording), _fingerprint(holdout)
-    if first is None or second is None:
-        return
-    short, long = sorted((first, second), key=len)
-    rows = {row.tobytes() for row in long}
-    common = sum(row.tobytes() in rows for row in short)
-    if common > 0.5 * len(short):
-        raise DiagnosisError(
-            f"the held-out recording {holdout.source} is the recording {recording.source} itself ({common} of "
-            f"{len(short)} samples are the same): it proves nothing. Record another motion, or leave it out"
-        )
-
-
-def _fingerprint(recording: Recording | ProcessedRecording) -> FloatArray | None:
     if isinstance(recording, ProcessedRecording):
-        values = np.concatenate([np.asarray(recording.period_tau_motor).reshape(-1, len(recording.joint_names))])
-    else:
-        names = [n for n in recording.columns if n.startswith(("tau_motor_", "current_", "q_", "theta_"))]
-        names = [n for n in names if "_reference_" not in n]
-        values = np.stack([recording.columns[n] for n in sorted(names)], axis=1)
-    return np.ascontiguousarray(values) if len(values) else None
+        return
+    for joint in robot.joints:
+        name = joint.name
+        kinds = ["q", *(["theta"] if joint.elastic else []), "tau_motor"]
+        if not recording.has("tau_motor", name):
+            kinds[-1] = "current"
+        for kind in kinds:
+            if not recording.has(kind, name) or recording.samples < 2:
+                continue
+            values = recording.columns[f"{kind}_{name}"]
+            if np.ptp(values) > 0.0:
+                continue
+            what = "no torque is measured"
+            if kind in ("q", "theta"):
+                what = "the sensor is dead, or the joint does not move"
+            raise DiagnosisError(
+                f"{recording.source}: column {kind}_{name} is constant, {values[0]:g}: {what}, and nothing can be "
+                f"told. Record it, or identify and diagnose a model without {name!r} (joints, on the command "
+                "line --joints)"
+            )
 
 
 def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) -> FloatArray | None:
@@ -178,7 +183,7 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
     for i in np.flatnonzero(share > 0.0):
         name = data.robot.joint_names[int(i)]
         warnings.append(
-            f"{data.source}: the torque or current of {name!r} stays at its largest value for {100 * share[i]:.2g} % "
+            f"{data.source}: the torque or current of {name!r} stays at its largest value for {100 * share[i]:.3g} % "
             "of the time: it is clipped. These samples were left out; record with less torque"
         )
         fatal = fatal or bool(share[i] > CLIPPED_SHARE)

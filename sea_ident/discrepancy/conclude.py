@@ -1,5 +1,6 @@
 """What a search, its confirmation and the held-out data add up to: the verdict and its evidence."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from sea_ident.discrepancy.findings import (
     Waveforms,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.gap import gap_of, torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
@@ -100,8 +101,10 @@ def conclude(
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     holds = held_gap is None or explains(gap, held_gap)
+    if held is not None and held_gap is not None:
+        holds = holds and predicts(held_gap, torque_by_joint(held.bench))
     sound = notes
-    notes = check.drowned(notes, gap, _torque_by_joint(bench))
+    notes = check.drowned(notes, gap, torque_by_joint(bench))
     lost = notes is not sound
     if lost:
         remainder = 0.0
@@ -113,8 +116,8 @@ def conclude(
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
-        units={joint.name: joint.torque_unit for joint in bench.data.robot.joints},
-        other_motion=held is not None and held.other_motion, nameless=nameless,
+        units=check.torque_units(bench.robot),
+        other_motion=held is not None and held.other_motion, nameless=nameless, sound=not notes.fatal,
     )  # fmt: skip
     found = Diagnosis(
         verdict=verdict,
@@ -159,12 +162,12 @@ def explains(training: Gap, held: Gap) -> bool:
     return left < FAR_BEYOND * noise or training.shrink < GOES or held.shrink > STAYS * training.shrink
 
 
-def _torque_by_joint(bench: Bench) -> dict[str, float]:
-    """Largest rms torque of the equations of each joint [N m] or [N]."""
-    found: dict[str, float] = {}
-    for equation, rms in zip(bench.data.equations, bench.torque_rms, strict=True):
-        found[equation.joint] = max(found.get(equation.joint, 0.0), float(rms))
-    return found
+def predicts(held: Gap, torque: Mapping[str, float]) -> bool:
+    """Whether a model is better than none on other data: what it leaves is less than the rms torque by joint.
+
+    Wrong units, exchanged joints or another robot leave more.
+    """
+    return all(left <= torque[joint] for joint, left in held.after.items())
 
 
 def verdict_of(

@@ -24,6 +24,7 @@ from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.relatives import unnamed
 from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
@@ -78,10 +79,12 @@ def diagnose(
     tell("reading the periods", 0.0)
     robot = model.robot
     check.models_match(model, reference)
-    check.columns_match(robot, recording)
+    for given in (recording, holdout):
+        if given is not None:
+            check.columns_match(robot, given)
+            check.channels_move(robot, given)
     if holdout is not None:
-        check.columns_match(robot, holdout)
-        check.not_the_same(recording, holdout)
+        not_the_same(recording, holdout)
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         processed = wide_processing(recording, robot, period or _period_of(model, recording))
@@ -129,6 +132,7 @@ def diagnose(
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
+    diagnosis = replace(diagnosis, units=check.torque_units(robot))
     tell("done", 1.0)
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=2)

@@ -19,6 +19,7 @@ from sea_ident.discrepancy.findings import (
     NextExperiment,
     Verdict,
     Waveforms,
+    chance,
 )
 from sea_ident.effects import effect_from_dict
 from sea_ident.estimation import Model
@@ -47,6 +48,7 @@ class Diagnosis:
         waveforms: for pictures.
         recording: source of the recording.
         holdout_source: source of the held-out data, None where there is none.
+        units: unit of the torque of each joint, N m or N.
     """
 
     verdict: Verdict
@@ -64,14 +66,15 @@ class Diagnosis:
     waveforms: Waveforms | None = None
     recording: str = ""
     holdout_source: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def summary(self) -> str:
         """The paragraph, and the tables behind it."""
         lines = [f"{self.verdict}: {self.text}"]
+        kind = "perhaps" if self.verdict is Verdict.CANNOT_TELL else "missing"
         for m in self.missing:
             where = f" at {m.joint}" if m.joint else ""
-            chance = f"{m.p_value:.1e}" if m.p_value > 1e-300 else "< 1e-300"
-            lines.append(f"  missing: {m.effect}{where}, {m.extent}, p {chance}")
+            lines.append(f"  {kind}: {m.effect}{where}, {m.extent}, p {chance(m.p_value)}")
             lines.extend(f"    {p.name} {p.value:.4g} +- {p.std:.2g} {p.unit}" for p in m.parameters)
             if m.alternatives:
                 others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)
@@ -80,7 +83,8 @@ class Diagnosis:
         gaps |= {f"forward simulation of {kind}": gap for kind, gap in self.simulation_gap.items()}
         positions = ("of q", "of theta")
         lines.extend(
-            f"  gap [{'rad or m' if label.endswith(positions) else 'N m or N'}], {label}: {gap.summary()}"
+            f"  gap [{position_unit(self.units) if label.endswith(positions) else torque_unit(self.units)}], {label}: "
+            f"{gap.summary()}"
             for label, gap in gaps.items()
             if gap is not None
         )
@@ -101,6 +105,7 @@ class Diagnosis:
             "summary": self.text,
             "recording": self.recording,
             "holdout": self.holdout_source,
+            "units": dict(self.units),
             "lack_of_fit": {
                 "statistic": self.lack_of_fit.statistic,
                 "dof": self.lack_of_fit.dof,
@@ -152,6 +157,17 @@ class Diagnosis:
             partial.replace(target)
         except OSError as error:
             raise ModelFileError(f"{target}: the diagnosis cannot be written: {error}") from error
+
+
+def torque_unit(units: Mapping[str, str]) -> str:
+    """Unit of the torques of all joints, whose own are given; of either kind where they differ or are not known."""
+    of_all = set(units.values())
+    return of_all.pop() if len(of_all) == 1 else "N m or N"
+
+
+def position_unit(units: Mapping[str, str]) -> str:
+    """Unit of the positions of all joints, of which those of the torque are given."""
+    return {"N m": "rad", "N": "m"}.get(torque_unit(units), "rad or m")
 
 
 def read_diagnosis(path: str | Path) -> Diagnosis:
@@ -242,6 +258,7 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
         waveforms=None if waves is None else _waveforms_from_dict(waves),
         recording=record.get("recording", ""),
         holdout_source=record.get("holdout"),
+        units={str(joint): str(unit) for joint, unit in record.get("units", {}).items()},
     )  # fmt: skip
 
 

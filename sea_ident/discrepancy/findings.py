@@ -1,13 +1,16 @@
 """The parts of a diagnosis."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.atomic import atomic_file
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
@@ -24,6 +27,15 @@ class Verdict(StrEnum):
     NOT_IN_LIBRARY = "not_in_library"
     ONLY_AGAINST_REFERENCE = "only_against_reference"
     CANNOT_TELL = "cannot_tell"
+
+
+SMALLEST = 1e-300
+"""Probability that is not told from zero."""
+
+
+def chance(p_value: float) -> str:
+    """A probability, to be read behind the letter p."""
+    return f"= {p_value:.2g}" if p_value > SMALLEST else f"< {SMALLEST:g}"
 
 
 @dataclass(frozen=True)
@@ -203,6 +215,15 @@ class NextExperiment:
     separates: tuple[str, str]
     excitation: Mapping[str, Any]
     gain: float
+
+    def save(self, path: str | Path) -> None:
+        """Write the excitation as `excite` does; `read_excitation` reads it.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        with atomic_file(path) as temporary:
+            temporary.write_text(json.dumps(dict(self.excitation), indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,3 +32,11 @@ def gap_of(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor) -> Gap:
         per_joint(bench, excess_power(bench, after, noise)),
         per_joint(bench, noise.std**2),
     )
+
+
+def torque_by_joint(bench: Bench) -> dict[str, float]:
+    """Largest rms torque of the equations of each joint [N m] or [N]."""
+    found: dict[str, float] = {}
+    for equation, rms in zip(bench.data.equations, bench.torque_rms, strict=True):
+        found[equation.joint] = max(found.get(equation.joint, 0.0), float(rms))
+    return found

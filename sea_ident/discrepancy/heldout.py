@@ -9,6 +9,7 @@ from sea_ident.discrepancy import assess, check
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.gap import gap_of, torque_by_joint
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
@@ -90,6 +91,12 @@ def held_out(
     if bench.data.caution > data.caution:
         data = away_from_reversals(data, bench.data.caution)
     found = tried(Bench(data, bench.effects), selection, processed.source)
+    gap = gap_of(found.bench, found.before, found.after, found.noise)
+    lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench))
+    if lost.fatal:
+        warnings.extend(f"held-out data: {text}" for text in lost.warnings)
+        warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")
+        return other_periods(bench, selection), tuple(warnings)
     return replace(found, processed=processed, recording=holdout), tuple(warnings)
 
 

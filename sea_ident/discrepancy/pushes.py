@@ -30,8 +30,15 @@ SHORTEST = 0.01
 """What departs for less than this is a spike of a sensor or the instant of a jump of friction, no push [s]."""
 
 CLEAR_AT_REVERSAL = 0.06
-"""Around a reversal friction that differs from pass to pass departs for up to this [s]: what is shorter counts only
-beside pushes that are clear."""
+"""Around a reversal friction that differs from pass to pass departs while the joint hardly moves, and for up to this
+beyond [s]: what is shorter counts only beside pushes that are clear."""
+
+SLOW = 0.02
+"""Share of the rms speed of a joint below which it hardly moves."""
+
+CHANCE = 1e-3
+"""Probability below which the strongest departure at a joint is none of the usual ones, with tails as heavy as
+exponential ones."""
 
 LONGEST = 0.25
 """Share of the recording that pushes at a joint may take; beyond it the residual is no push but a poor model."""
@@ -83,12 +90,13 @@ def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_
     for i in range(residual.shape[1]):
         smooth = uniform_filter1d(own[:, i], window)
         usable = np.ones(len(time), dtype=np.bool_)
-        reversing = _near_reversal(speed[:, i], round(REVERSAL / interval))
+        slow = np.abs(speed[:, i]) < SLOW * float(np.sqrt(np.mean(speed[:, i] ** 2)))
+        reversing = _near_reversal(speed[:, i], slow, round(REVERSAL / interval))
         if not repeats:
             usable = ~reversing
             # slow misfit is not a push
             smooth = smooth - _slow(smooth, usable, max(window, round(0.5 / interval)))
-        found.extend(_runs(i, time, own[:, i], smooth, usable, reversing))
+        found.extend(_runs(i, time, own[:, i], smooth, usable, slow, reversing))
     return tuple(sorted(found, key=lambda p: p.start))
 
 
@@ -123,8 +131,12 @@ def _slow(values: FloatArray, usable: NDArray[np.bool_], around: int) -> FloatAr
     return np.asarray(slow, dtype=np.float64)
 
 
-def _near_reversal(speed: FloatArray, reach: int) -> NDArray[np.bool_]:
-    slow = np.abs(speed) < 0.02 * float(np.sqrt(np.mean(speed**2)))
+def chance(z: float, samples: int) -> float:
+    """Probability of such a departure in so many samples if its tails are as heavy as exponential ones."""
+    return float(min(1.0, samples * np.exp(-z * np.log(2.0) / 0.6745)))
+
+
+def _near_reversal(speed: FloatArray, slow: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     crossing = np.sign(speed) != np.sign(np.roll(speed, 1))
     return np.asarray(binary_dilation(slow | crossing, iterations=max(reach, 1)), dtype=np.bool_)
 
@@ -135,6 +147,7 @@ def _runs(
     own: FloatArray,
     smooth: FloatArray,
     usable: NDArray[np.bool_],
+    slow: NDArray[np.bool_],
     reversing: NDArray[np.bool_],
 ) -> list[Push]:
     interval = float(time[1] - time[0])
@@ -168,12 +181,15 @@ def _runs(
         length = float(time[end] - time[begin]) + 0.5 * interval
         if length < SHORTEST:
             continue
-        clear = clear or not reversing[peak] or length >= CLEAR_AT_REVERSAL
         span = slice(begin, end + 1)
+        z = float(abs(smooth[peak]) / spread)
+        moving = length - interval * np.count_nonzero(slow[span])
+        if chance(z, len(time)) < CHANCE:
+            clear = bool(clear or not reversing[peak] or moving >= CLEAR_AT_REVERSAL)
         found.append(
             Push(
                 joint, float(time[begin]), float(time[end]), float(smooth[peak]),
-                float(own[span].sum() * interval), float(abs(smooth[peak]) / spread),
+                float(own[span].sum() * interval), z,
             )
         )  # fmt: skip
     if not clear or sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):

@@ -17,6 +17,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, circular
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.candidates import Candidate, candidate_effects, scan
+from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
@@ -29,7 +30,7 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
-from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, find_pushes, pushed
+from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, chance, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import FAMILY_LEVEL
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -152,7 +153,7 @@ def diagnose_unrepeated(
     repaired = None if pushes else repaired_model(model, processed, now.fit)
     diagnosis = Diagnosis(
         verdict=verdict,
-        text=_text(robot.joint_names, verdict, missing, gap, pushes, found),
+        text=_text(robot, verdict, missing, gap, pushes, found),
         lack_of_fit=LackOfFit(0.0, 0, 1.0, 1.0, {joint: {} for joint in robot.joint_names}),
         locations=tuple(
             Location(
@@ -167,6 +168,7 @@ def diagnose_unrepeated(
         warnings=tuple(dict.fromkeys(notes)),
         model=repaired,
         recording=processed.source,
+        units=torque_units(robot),
     )  # fmt: skip
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
@@ -273,7 +275,7 @@ def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[P
         own = [p for p in pushes if p.joint == i]
         if not own:
             continue
-        strongest = max(own, key=lambda p: abs(p.force))
+        strongest = max(own, key=lambda p: p.z)
         stem = f"{joint}.external_force"
         interval = processed.interval
         out.append(
@@ -293,17 +295,12 @@ def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[P
                     ),
                 ),
                 torque_share=float(abs(strongest.force) / max(rms[i], 1e-300)),
-                p_value=_tail(min(p.z for p in own), processed.samples),
+                p_value=chance(strongest.z, processed.samples),
                 alternatives=(),
                 detail=make_effect("external_force", joint, start=strongest.start, stop=strongest.stop),
             )
         )
     return out
-
-
-def _tail(z: float, samples: int) -> float:
-    """Probability of such a departure in so many samples if its tails are as heavy as exponential ones."""
-    return float(min(1.0, samples * np.exp(-z * np.log(2.0) / 0.6745)))
 
 
 def _verdict(missing: list[MissingEffect]) -> Verdict:
@@ -330,7 +327,7 @@ def _gap(bench: StretchBench, before: Fit, after: Fit, pushes: tuple[Push, ...])
 
 
 def _text(
-    joints: tuple[str, ...],
+    robot: Robot,
     verdict: Verdict,
     missing: list[MissingEffect],
     gap: Gap,
@@ -345,7 +342,7 @@ def _text(
         )
     for m in missing:
         if m.effect == "external_force":
-            own = [p for p in pushes if joints[p.joint] == m.joint]
+            own = [p for p in pushes if robot.joint_names[p.joint] == m.joint]
             times = ", ".join(f"{p.start:.3f}" for p in own[:6])
             more = f" and {len(own) - 6} more" if len(own) > 6 else ""
             parts.append(
@@ -360,8 +357,8 @@ def _text(
             f"{item.better} of {BLOCKS} blocks are predicted better, {100 * item.gain:.0f} % less squared error."
         )
     parts.extend(
-        f"{joint}: {gap.after[joint]:.3g} (rms) is left beyond a fast part of {gap.noise[joint]:.2g}; slow noise and "
-        "missing effects cannot be told apart in it."
-        for joint in joints
+        f"{joint.name}: {gap.after[joint.name]:.3g} {joint.torque_unit} rms is left beyond a fast part of "
+        f"{gap.noise[joint.name]:.2g} {joint.torque_unit}; slow noise and missing effects cannot be told apart in it."
+        for joint in robot.joints
     )
     return " ".join(parts)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.data import PeriodData
-from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict
+from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.trend import TrendTest
@@ -32,6 +32,7 @@ class Facts:
         units: unit of the torque of each joint.
         other_motion: whether the held-out data are another motion, not only other periods of the same.
         nameless: what explains the recording better in the place of an effect that was found, and has no name.
+        sound: whether the recording allows a conclusion; warnings say why where it does not.
     """
 
     verdict: Verdict
@@ -46,17 +47,22 @@ class Facts:
     units: Mapping[str, str]
     other_motion: bool = True
     nameless: tuple[Unnamed, ...] = ()
+    sound: bool = True
 
 
 def paragraph(facts: Facts) -> str:
     """One paragraph that a person can act on."""
     parts = [_opening(facts)]
     if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
-        parts.append(_gap_sentence(facts.gap, facts.units))
-        if facts.held is not None:
-            parts.append(_held_sentence(facts))
+        drifting = {(t.effect.name, t.effect.joint) for t in facts.trend.trends}
+        if all((m.effect, m.joint) in drifting for m in facts.missing):
+            parts.append("It shows in the comparison of the periods; the mean over all of them hides it.")
+        else:
+            parts.append(_gap_sentence(facts.gap, facts.units))
+            if facts.held is not None:
+                parts.append(_held_sentence(facts))
     if facts.remainder > 0.0:
-        parts.append(f"A remainder of {100 * facts.remainder:.2g} % of the torque has no name.")
+        parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
     if facts.verdict is Verdict.SUSPECT:
         parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
     return " ".join(parts)
@@ -121,6 +127,11 @@ def reservations(facts: Facts, held_out: bool) -> list[str]:
     return found
 
 
+def _percent(share: float) -> str:
+    """A share with two digits, and no power of ten."""
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
+
+
 def _name(m: MissingEffect) -> str:
     return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
 
@@ -135,7 +146,14 @@ def _opening(facts: Facts) -> str:
     names = ", ".join(f"{_name(m)} ({m.extent})" for m in facts.missing)
     match facts.verdict:
         case Verdict.NONE:
-            return f"Nothing is missing that {facts.periods} periods could show (lack of fit p = {facts.p_value:.2g})."
+            return (
+                f"Nothing is missing that {facts.periods} periods could show (lack of fit p {chance(facts.p_value)})."
+            )
+        case Verdict.NAMED | Verdict.NAMED_WITH_REMAINDER if facts.periods < FEW_PERIODS:
+            return (
+                f"As far as {facts.periods} periods can show, the model lacks {names}; it takes {FEW_PERIODS} periods "
+                "to be sure of a name."
+            )
         case Verdict.NAMED | Verdict.NAMED_WITH_REMAINDER:
             return f"The model lacks {names}."
         case Verdict.AMBIGUOUS:
@@ -154,9 +172,11 @@ def _opening(facts: Facts) -> str:
             return f"Something is missing that is not in the library.{near}{better}"
         case Verdict.ONLY_AGAINST_REFERENCE:
             return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."
+        case _ if not facts.sound:
+            return "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."
         case _ if facts.p_value < DISAGREES:
             return (
-                f"Model and data disagree beyond the noise (p = {facts.p_value:.2g}), but {facts.periods} period(s) of "
+                f"Model and data disagree beyond the noise (p {chance(facts.p_value)}), but {facts.periods} periods of "
                 "this recording do not tell by what."
             )
         case _:

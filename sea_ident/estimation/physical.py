@@ -58,6 +58,8 @@ def physical_parameters(
     std = np.where(model.std > 0.0, model.std, np.maximum(np.abs(model.values), 1e-12) * 1e-6)
     target = model.values if np.all(np.abs(shift / std) < CONSISTENT) else problem.grouping @ nearest
     values, drawn_by = problem.drawn_or_nearest(target, nearest, pull)
+    # below zero by no more than the solver's accuracy
+    values[problem.signed] = np.maximum(values[problem.signed], 0.0)
     base_values = problem.grouping @ values
     shift = base_values - model.values
     consistent = bool(np.all(np.abs(shift / std) < CONSISTENT))
@@ -227,9 +229,6 @@ class _Problem:
             program.nonnegative(rows, (scaled @ particular)[:, None].ravel() / norms.ravel() + 1e-9)
         y = program.solve("parameters nearest to the description")[:m]
         values = (particular + free @ y) * self.scale
-        for k in self.signed:
-            if -1e-8 * self.scale[k] < values[k] < 0.0:
-                values[k] = 0.0
         return np.asarray(values, dtype=np.float64)
 
     def holding_back(self, model: Model, chi_square: float) -> tuple[str, ...]:

@@ -78,8 +78,8 @@ def plant_from_model(robot: Robot, effects: Sequence[Effect], parameters: FloatA
         The plant, its friction laws and the effects that act beside it.
 
     Raises:
-        SimulationError: wrong number of values, a value that is missing, a body without mass, a spring that the model
-            does not hold.
+        SimulationError: wrong number of values, a value that is missing, a body without mass, a rotor of negative
+            inertia, a spring that the model does not hold.
     """
     counts = [len(effect.columns(robot)) for effect in effects]
     if parameters.shape != (sum(counts),):
@@ -121,6 +121,12 @@ def plant_from_model(robot: Robot, effects: Sequence[Effect], parameters: FloatA
         mass, moments = inertial[10 * k], inertial[10 * k + 1 : 10 * k + 4]
         if mass == 0.0 and np.any(moments != 0.0):
             raise SimulationError(f"the model gives body {body!r} first moments and no mass; give it one")
+    if np.any(rotors < 0.0):
+        k = int(np.argmin(rotors))
+        raise SimulationError(
+            f"the model gives the rotor of {robot.rotors[k].joint!r} the inertia {rotors[k]:g} kg m2; it cannot "
+            "be negative"
+        )
     return ModelPlant(
         Plant(
             robot.with_inertial_parameters(inertial, rotors),

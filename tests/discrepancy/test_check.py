@@ -1,7 +1,13 @@
 """Checks at the border of the diagnosis."""
 
-from sea_ident.discrepancy.check import Findings, drowned
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.check import Findings, channels_move, drowned
 from sea_ident.discrepancy.findings import Gap
+from sea_ident.exceptions import DiagnosisError
+from sea_ident.recordings import Recording
+from sea_ident.robot import load_robot
 
 
 def test_noise_beyond_the_torque_lets_nothing_be_told():
@@ -14,3 +20,14 @@ def test_noise_beyond_the_torque_lets_nothing_be_told():
         assert found.fatal
         assert found.warnings[0] == "clipped"
         assert "the noise of grip" in found.warnings[1]
+
+
+@pytest.mark.parametrize("column", ["q_hip", "theta_knee", "tau_motor_ankle"])
+def test_a_joint_that_does_not_move_or_has_no_torque_is_refused(column):
+    leg, time = load_robot("exo_leg"), 0.01 * np.arange(200)
+    columns = {f"{kind}_{name}": np.sin(time) for kind in ("q", "theta", "tau_motor") for name in leg.joint_names}
+    columns |= {"current_ankle": np.zeros(200)}
+    channels_move(leg, Recording(time=time, columns=columns, source="a.csv"))
+    dead = Recording(time=time, columns={**columns, column: np.full(200, 0.25)}, source="a.csv")
+    with pytest.raises(DiagnosisError, match=rf"a.csv: column {column} is constant, 0.25: .*--joints"):
+        channels_move(leg, dead)

@@ -12,7 +12,7 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.conclude import without_sizes
+from sea_ident.discrepancy.conclude import explains, predicts, without_sizes
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
@@ -108,3 +108,13 @@ def test_an_effect_that_no_library_has_gets_no_name_of_its_own(laboratory):
     assert found.lack_of_fit.p_value < 1e-6
     assert found.locations[0].joint == "knee"
     assert found.lack_of_fit.remainder > 3e-3
+
+
+def test_what_predicts_worse_than_no_model_does_not_hold_there():
+    torque = {"hip": 10.0, "knee": 4.0}
+    noise = {"hip": 300.0, "knee": 200.0}
+    assert predicts(Gap({"hip": 9.0, "knee": 5.0}, {"hip": 1.0, "knee": 3.9}, noise), torque)
+    # within three times its noise, but that says nothing where it is beyond the torque itself
+    wild = Gap({"hip": 900.0, "knee": 0.0}, {"hip": 600.0, "knee": 0.0}, noise)
+    assert explains(Gap({"hip": 1.0}, {"hip": 0.0}, {"hip": 0.1}), wild)
+    assert not predicts(wild, torque)

@@ -101,3 +101,27 @@ def test_friction_that_differs_from_pass_to_pass_is_no_push(laboratory, periods,
         model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
         processed = wide_processing(recording, laboratory.leg, PERIOD)
         assert pushes_between_passes(model, recording, processed) == ()
+
+
+def test_a_reversal_at_which_the_joint_lingers_is_no_push():
+    # slow around zero for 80 ms, where friction that differs from pass to pass may last just as long
+    speed = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
+    values = 0.02 * np.random.default_rng(3).standard_normal(speed.shape)
+    turn = 1625  # of the first joint
+    speed[turn - 5 : turn + 5, 0] = 0.01
+    values[turn - 5 : turn + 4, 0] += 2.0
+    assert find_pushes(TIME, values, speed, SAMPLES) == ()
+    speed[turn - 5 : turn + 5, 0] = 0.1
+    (push,) = find_pushes(TIME, values, speed, SAMPLES)
+    assert push.start == pytest.approx(TIME[turn - 5], abs=1.01 * INTERVAL)
+
+
+def test_a_departure_that_a_long_recording_holds_by_chance_is_no_push():
+    tails = np.random.default_rng(4).laplace(scale=0.02, size=(len(TIME), 1))
+    quiet = np.full((len(TIME), 1), 1.0)
+    lasting = slice(3000, 3003)
+    for z, count in ((11.0, 0), (25.0, 1)):
+        values = tails.copy()
+        values[lasting] = z * float(np.median(np.abs(tails))) / 0.6745
+        found = find_pushes(TIME, values, quiet, SAMPLES)
+        assert len(found) == count

@@ -1,7 +1,13 @@
 """The words of a diagnosis."""
 
-from sea_ident.discrepancy.findings import Gap
-from sea_ident.discrepancy.words import _gap_sentence
+from types import SimpleNamespace
+
+import pytest
+
+from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph
+from sea_ident.effects import make_effect
 
 
 def test_the_gap_of_a_slide_is_a_force():
@@ -10,3 +16,39 @@ def test_the_gap_of_a_slide_is_a_force():
     assert "(0.3 N) at lift" in _gap_sentence(gap, units)
     turned = Gap({"lift": 0.1, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, gap.noise)
     assert "to 0.1 N m at turn" in _gap_sentence(turned, units)
+
+
+def facts(verdict, periods=12, remainder=0.0, p_value=0.0, sound=True, trends=()):
+    gap = Gap({"hip": 0.5}, {"hip": 0.0}, {"hip": 0.1})
+    missing = (MissingEffect("torque_offset", "hip", (), 0.05, 1e-9, ()),)
+    trend = TrendTest(1.0, trends, False)
+    return Facts(verdict, missing, gap, None, remainder, periods, p_value, trend, None, {"hip": "N m"}, sound=sound)
+
+
+@pytest.mark.parametrize("verdict", [Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER])
+def test_few_periods_are_said_before_the_name(verdict):
+    assert paragraph(facts(verdict)).startswith("The model lacks torque_offset at hip")
+    few = paragraph(facts(verdict, periods=3))
+    assert few.startswith("As far as 3 periods can show, the model lacks torque_offset at hip")
+    assert "10 periods to be sure" in few
+
+
+def test_a_recording_with_a_fault_is_to_blame_not_the_number_of_its_periods():
+    assert "wrong with this recording" in paragraph(facts(Verdict.CANNOT_TELL, sound=False))
+    assert "12 periods of this recording do not tell" in paragraph(facts(Verdict.CANNOT_TELL))
+
+
+def test_no_probability_is_zero_and_no_percentage_a_power_of_ten():
+    assert chance(0.0) == "< 1e-300"
+    assert chance(0.03) == "= 0.03"
+    assert "p < 1e-300" in paragraph(facts(Verdict.CANNOT_TELL))
+    assert "A remainder of 940 % of" in paragraph(facts(Verdict.NAMED_WITH_REMAINDER, remainder=9.4))
+    assert "A remainder of 0.42 % of" in paragraph(facts(Verdict.NAMED_WITH_REMAINDER, remainder=0.0042))
+
+
+def test_of_what_drifts_no_gap_of_the_mean_is_told():
+    drift = SimpleNamespace(effect=make_effect("torque_offset", "hip"))
+    text = paragraph(facts(Verdict.NAMED, trends=(drift,)))
+    assert "shows in the comparison of the periods" in text
+    assert "gap" not in text
+    assert "the gap on this recording goes from 0.5" in paragraph(facts(Verdict.NAMED))

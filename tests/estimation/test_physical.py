@@ -69,6 +69,14 @@ def test_impossible_values_move_to_the_nearest_possible(model):
     assert gradient @ (values - found.base_values) < 0.0
 
 
+@pytest.mark.parametrize("value", [-1e-3, -1e-7, -1e-12])
+def test_no_friction_stays_below_zero_by_however_little(model, value):
+    values = model.values.copy()
+    values[model.names.index("ankle.coulomb_friction")] = value
+    found = physical_parameters(replace(model, values=values))
+    assert 0.0 <= found.named()["ankle.coulomb_friction"] < 1e-3
+
+
 def test_negative_friction_becomes_zero(model):
     values = model.values.copy()
     row = model.names.index("ankle.coulomb_friction")

@@ -1,6 +1,7 @@
 """Friction of motor and link, where springs are too stiff to tell one from the other."""
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from estimation.synthetic import record, truth_of
 from sea_ident.effects import base_effects
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.estimation import identify
+from sea_ident.estimation.estimators.instrumental_variables import _estimate
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
 from sea_ident.robot import load_robot
@@ -73,3 +75,26 @@ def test_friction_on_both_sides_of_soft_springs_is_told_apart():
     truth = truth_of(leg, series, 1000, effects)
     model = identified(leg, record(leg, truth, 10, torque_noise=0.02, encoder_noise=1e-6), effects)
     assert not any("friction of motor and of link" in text for text in model.warnings)
+
+
+def test_what_is_hardly_told_apart_still_has_a_covariance():
+    """A product of matrices that are nearly singular leaves rounding only, and what is known of a sum is lost."""
+    rng = np.random.default_rng(0)
+    shared, own = rng.normal(size=(2, 400, 1))
+    for apart in (1e-2, 1e-4, 1e-6):
+        instruments = np.stack([shared, shared + apart * own], axis=2)
+        variance = rng.uniform(0.5, 2.0, size=(400, 1))
+        cross = np.einsum("knb,knc->bc", instruments, instruments)
+        first = SimpleNamespace(
+            variance=variance, weights=None, solution=SimpleNamespace(log_det=0.0), notes=(), warnings=()
+        )
+        found = _estimate(first, np.zeros(2), instruments, cross, 0, "").covariance
+        # in the coordinates of the two directions nothing is nearly singular
+        plain = np.stack([shared, own], axis=2)
+        gram = np.linalg.inv(np.einsum("knb,knc->bc", plain, plain))
+        exact = gram @ np.einsum("knb,kn,knc->bc", plain, variance, plain) @ gram
+        back = np.array([[1.0, -1.0 / apart], [0.0, 1.0 / apart]])
+        std = np.sqrt(np.diag(back @ exact @ back.T))
+        np.testing.assert_allclose(np.sqrt(np.diag(found)), std, rtol=1e-3)
+        assert np.linalg.eigvalsh(found / np.outer(std, std))[0] > -1e-12
+        assert np.ones(2) @ found @ np.ones(2) == pytest.approx(exact[0, 0], rel=1e-2)

@@ -23,6 +23,7 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.report import write_report
 from sea_ident.report.bars import bars
+from sea_ident.report.chart import Band, Line
 from sea_ident.report.sections.missing import curve
 from sea_ident.report.sections.verdict import MEANING
 
@@ -90,6 +91,7 @@ def diagnosis() -> Diagnosis:
         waveforms=waveforms(),
         recording="rec.csv",
         holdout_source="rec2.csv",
+        units=dict.fromkeys(JOINTS, "N m"),
     )  # fmt: skip
 
 
@@ -142,7 +144,7 @@ def test_every_verdict_has_a_page_even_with_nothing_else(verdict, tmp_path):
 
 
 def test_the_curve_of_friction_is_drawn_over_velocity(diagnosis):
-    chart = curve(diagnosis.missing[0], diagnosis.waveforms)
+    chart = curve(diagnosis.missing[0], diagnosis.waveforms, diagnosis.units)
     assert chart.x_label == "motor velocity of the knee [rad/s]"
     line = chart.marks[1]
     expected = 0.6 * np.sign(line.x) * np.exp(-((line.x / SPEED) ** 2))
@@ -158,7 +160,37 @@ def test_an_effect_that_follows_no_state_is_drawn_over_time(diagnosis):
     pulse[150:180, 1] = 1.0
     pushed = replace(waves, explained={"external_force at hip": pulse})
     effect = MissingEffect("external_force", "hip", (), 0.1, 1e-9, ())
-    assert curve(effect, pushed).x_label == "time [s]"
+    assert curve(effect, pushed, diagnosis.units).x_label == "time [s]"
+
+
+def test_what_depends_on_more_than_one_quantity_is_a_curve_over_time_with_its_band(diagnosis):
+    waves = diagnosis.waveforms
+    both = np.zeros((400, 6))
+    both[:, 2] = 0.3 * np.sign(waves.dtheta[:, 1]) * np.abs(np.sin(7.0 * waves.time))
+    band = np.full((400, 6), 0.05)
+    label = "load_dependent_friction at knee"
+    waves = replace(waves, explained={label: both}, bands={label: band})
+    chart = curve(MissingEffect("load_dependent_friction", "knee", (), 0.1, 1e-9, ()), waves, {})
+    assert chart.x_label == "time [s]"
+    (line,) = (mark for mark in chart.marks if isinstance(mark, Line))
+    (around,) = (mark for mark in chart.marks if isinstance(mark, Band))
+    np.testing.assert_allclose(line.y, both[:, 2])
+    np.testing.assert_allclose(around.upper - around.lower, 4.0 * 0.05)
+
+
+def test_a_sliding_joint_has_its_own_units(diagnosis, tmp_path):
+    slides = replace(diagnosis, units={"hip": "N m", "knee": "N", "ankle": "N m"})
+    chart = curve(slides.missing[0], slides.waveforms, slides.units)
+    assert chart.x_label == "motor velocity of the knee [m/s]"
+    assert chart.y_label == "force [N], knee motor"
+    assert "gap [N m or N], training" in slides.summary()
+    assert "gap [N m], training" in diagnosis.summary()
+    assert "gap [rad], forward simulation of q" in diagnosis.summary()
+    page = page_of(diagnosis, tmp_path)
+    for text in ("N m or N", "rad or m", "rad or mm"):
+        assert text not in page
+    diagnosis.save(tmp_path / "d.json")
+    assert read_diagnosis(tmp_path / "d.json").units == diagnosis.units
 
 
 def test_bars_are_as_high_as_their_values():

@@ -34,6 +34,15 @@ def test_model_without_springs_cannot_move_a_leg(leg):
         plant_from_model(leg, effects, plant_from_robot(leg).values_of(effects))
 
 
+def test_a_negative_rotor_inertia_is_refused(leg):
+    effects = (*base_effects(leg), *spring_effects(leg))
+    values = plant_from_robot(leg).values_of(effects)
+    names = [column.name for effect in effects for column in effect.columns(leg)]
+    values[names.index("motor.rotor_inertia")] = -1e-9
+    with pytest.raises(SeaIdentError, match="the rotor of 'hip' the inertia -1e-09 kg m2"):
+        plant_from_model(leg, effects, values)
+
+
 def test_missing_values_are_named(leg):
     effects = (*base_effects(leg), *spring_effects(leg))
     values = plant_from_robot(leg).values_of(effects)

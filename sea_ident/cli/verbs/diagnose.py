@@ -24,6 +24,12 @@ def diagnose(
     model_out: Annotated[
         Path | None, typer.Option("--model-out", metavar="MODEL2.json", help="Write the repaired model.")
     ] = None,
+    next_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--next", metavar="EXC.json", help="Write the motion that tells an ambiguous pair, as excite does."
+        ),
+    ] = None,
     period: Period = None,
     column: ForeignColumns = None,
     report: ReportFile = None,
@@ -37,7 +43,7 @@ def diagnose(
     from sea_ident.estimation import read_model
     from sea_ident.recordings import read_recording
 
-    check_targets(out, model_out, report, inputs=(model, recording, holdout, reference))
+    check_targets(out, model_out, next_out, report, inputs=(model, recording, holdout, reference))
     loaded, earlier = read_model(model), None if reference is None else read_model(reference)
     columns = read_columns(column)
     with progress(f"reading {recording.name}", SHARES) as tell:
@@ -57,6 +63,12 @@ def diagnose(
         else:
             found.model.save(model_out)
             files.append(str(model_out))
+    if next_out is not None:
+        if found.next_experiment is None:
+            note(f"warning: {next_out} is not written: the verdict {found.verdict} comes without a next experiment")
+        else:
+            found.next_experiment.save(next_out)
+            files.append(str(next_out))
     if report is not None:
         from sea_ident.report import write_report
 

@@ -2,15 +2,15 @@
 
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.diagnosis import Diagnosis, position_unit, torque_unit
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.report.bars import bars, bars_legend
 from sea_ident.report.chart import Band, Chart, Line
 from sea_ident.report.section import DiagnosisSection
 
 ROLES = ("before", "after", "noise")
+POSITIONS = ("q", "theta")
 NAMES = ("as it was", "with the effects", "noise")
-UNITS = {"q": ("mrad or mm", 1e3), "theta": ("mrad or mm", 1e3), "tau": ("N m or N", 1.0)}
 
 
 class GapSection(DiagnosisSection):
@@ -28,9 +28,13 @@ class GapSection(DiagnosisSection):
             ("data that were held out", diagnosis.holdout),
         ):
             if gap is not None:
-                groups.append((_bars(gap, f"On {label}", "N m or N"), _closed(gap, bool(diagnosis.missing))))
+                groups.append(
+                    (_bars(gap, f"On {label}", torque_unit(diagnosis.units)), _closed(gap, bool(diagnosis.missing)))
+                )
         for signal, gap in diagnosis.simulation_gap.items():
-            unit, scale = UNITS.get(signal, ("", 1.0))
+            unit, scale = torque_unit(diagnosis.units), 1.0
+            if signal in POSITIONS:
+                unit, scale = " or ".join(f"m{part}" for part in position_unit(diagnosis.units).split(" or ")), 1e3
             groups.append(
                 (_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap, bool(diagnosis.missing)))
             )
@@ -70,6 +74,7 @@ def _waves(diagnosis: Diagnosis) -> list[Any]:
     time = waves.time - waves.time[0]
     found = []
     for e, name in enumerate(waves.equations):
+        unit = diagnosis.units.get(name.rpartition(" ")[0], torque_unit({}))
         band = 2.0 * float(waves.noise[e])
         chart = Chart(
             [
@@ -77,7 +82,7 @@ def _waves(diagnosis: Diagnosis) -> list[Any]:
                 Line(time, waves.before[:, e], "before", "residual as it was"),
                 Line(time, waves.after[:, e], "after", "residual with the effects"),
             ],
-            "time [s]", "residual [N m]", f"{name} equation", height=150, link="diagnosis",
+            "time [s]", f"residual [{unit}]", f"{name} equation", height=150, link="diagnosis",
         )  # fmt: skip
         found.append({"svg": chart.svg(), "legend": chart.legend()})
     return found

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.diagnosis import Diagnosis, torque_unit
 from sea_ident.report.matrix import matrix
 from sea_ident.report.section import DiagnosisSection
 
@@ -33,12 +33,14 @@ class Locations(DiagnosisSection):
             # a logarithm, so that the weaker ones do not vanish beside the strongest
             values[i, j] = -np.log1p(x.z) / np.log1p(max(SATURATED, found[0].z))
             tips[i][j] = (
-                f"{x.joint}, {x.equation} equation\n{x.regime}\n{x.excess_rms:.3g} N m or N beyond noise, z = {x.z:.3g}"
+                f"{x.joint}, {x.equation} equation\n{x.regime}\n{x.excess_rms:.3g} "
+                f"{diagnosis.units.get(x.joint, torque_unit({}))} beyond noise, z = {x.z:.3g}"
             )
         names = [f"{joint}, {equation}" for joint, equation in rows]
         return {
             "map": matrix(values, names, regimes, tips, "Excess of the residual by joint and part of the motion"),
             "strongest": found[:8],
+            "unit": torque_unit(diagnosis.units),
         }
 
 

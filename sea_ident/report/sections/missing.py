@@ -1,11 +1,12 @@
 """The effects that are missing, each with its curve over the residual that it explains."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.diagnosis import Diagnosis, position_unit, torque_unit
 from sea_ident.discrepancy.findings import MissingEffect, Waveforms
 from sea_ident.report.chart import Band, Chart, Line, Mark, Points
 from sea_ident.report.section import DiagnosisSection
@@ -15,8 +16,8 @@ NEIGHBOURS = 5
 
 DOTS = 700
 
-FUNCTION = 0.97
-"""Share of an effect that a quantity explains from which on the effect is drawn as a function of it."""
+FUNCTION = 0.9
+"""Share of an effect that a quantity explains from which on the effect is drawn over it."""
 
 
 class Missing(DiagnosisSection):
@@ -32,7 +33,7 @@ class Missing(DiagnosisSection):
             return None
         blocks = []
         for effect in diagnosis.missing:
-            chart = None if diagnosis.waveforms is None else curve(effect, diagnosis.waveforms)
+            chart = None if diagnosis.waveforms is None else curve(effect, diagnosis.waveforms, diagnosis.units)
             where = f" at the {effect.joint}" if effect.joint else ""
             blocks.append(
                 {
@@ -44,11 +45,19 @@ class Missing(DiagnosisSection):
         return {"blocks": blocks}
 
 
-def curve(effect: MissingEffect, waves: Waveforms) -> Chart | None:
+def curve(effect: MissingEffect, waves: Waveforms, units: Mapping[str, str]) -> Chart | None:
     """What the effect explains, over the quantity that it depends on most clearly.
 
     The dots are the residual of the final model plus the effect: what is left for this effect to explain once the
     others have explained theirs.
+
+    Args:
+        effect: the effect.
+        waves: of the diagnosis.
+        units: unit of the torque of each joint.
+
+    Returns:
+        The chart, None where the effect explains nothing.
     """
     explained = _explained(effect, waves)
     if explained is None:
@@ -57,16 +66,16 @@ def curve(effect: MissingEffect, waves: Waveforms) -> Chart | None:
     torque = explained[:, e]
     if not np.any(torque):
         return None
-    axis, label = _abscissa(effect, waves, e, torque)
+    axis, label = _abscissa(effect, waves, e, torque, units)
+    unit = units.get(waves.equations[e].rpartition(" ")[0], torque_unit({}))
+    torque_label = f"torque [{unit}], {waves.equations[e]}"
+    if unit == "N":
+        torque_label = f"force [N], {waves.equations[e]}"
     left = waves.after[:, e] + torque
     step = max(1, len(torque) // DOTS)
     order = np.argsort(axis, kind="stable")
     over_time = label.startswith("time")
     marks: list[Mark] = [Points(axis[::step], left[::step], "before", "residual left to it")]
-    if not over_time and _share_explained(axis, torque) < FUNCTION:
-        # it depends on something else as well: a line would jump from sample to sample
-        marks.append(Points(axis[::step], torque[::step], "after", "the effect"))
-        return Chart(marks, label, f"torque [N m], {waves.equations[e]}", width=900, height=260)
     line = Line(axis[order], torque[order], "after", "the effect") if over_time else _smoothed(axis, torque)
     names = [name for name, values in waves.explained.items() if values is explained]
     if names and names[0] in waves.bands:
@@ -75,7 +84,7 @@ def curve(effect: MissingEffect, waves: Waveforms) -> Chart | None:
         marks.append(Band(line.x, line.y - half, line.y + half, "after", "\N{PLUS-MINUS SIGN}2 std of the effect"))
     return Chart(
         [*marks, line],
-        label, f"torque [N m], {waves.equations[e]}", width=900, height=260,
+        label, torque_label, width=900, height=260,
     )  # fmt: skip
 
 
@@ -86,19 +95,26 @@ def _explained(effect: MissingEffect, waves: Waveforms) -> FloatArray | None:
     return waves.explained[names[0]] if names else None
 
 
-def _abscissa(effect: MissingEffect, waves: Waveforms, equation: int, torque: FloatArray) -> tuple[FloatArray, str]:
-    """Of velocity, position and deflection of its joint and of time, the one that the torque is a function of."""
+def _abscissa(
+    effect: MissingEffect, waves: Waveforms, equation: int, torque: FloatArray, units: Mapping[str, str]
+) -> tuple[FloatArray, str]:
+    """Of velocity, position and deflection of its joint the one that the torque is a function of, else time.
+
+    Over what it depends on in part only, a line would jump from sample to sample.
+    """
     joints = list(dict.fromkeys(name.rpartition(" ")[0] for name in waves.equations))
     joint = effect.joint if effect.joint in joints else waves.equations[equation].rpartition(" ")[0]
     i = min(joints.index(joint), waves.q.shape[1] - 1)
+    unit = position_unit({joint: units[joint]} if joint in units else {})
+    speed = " or ".join(f"{part}/s" for part in unit.split(" or "))
     candidates = [
-        (waves.dtheta[:, i], f"motor velocity of the {joint} [rad/s]"),
-        (waves.deflection[:, i], f"deflection of the {joint} [rad]"),
-        (waves.q[:, i], f"position of the {joint} [rad]"),
+        (waves.dtheta[:, i], f"motor velocity of the {joint} [{speed}]"),
+        (waves.deflection[:, i], f"deflection of the {joint} [{unit}]"),
+        (waves.q[:, i], f"position of the {joint} [{unit}]"),
     ]
     scores = [_share_explained(x, torque) for x, _ in candidates]
     best = int(np.argmax(scores))
-    return candidates[best] if scores[best] > 0.5 else (waves.time - waves.time[0], "time [s]")
+    return candidates[best] if scores[best] > FUNCTION else (waves.time - waves.time[0], "time [s]")
 
 
 def _share_explained(x: FloatArray, values: FloatArray) -> float:

@@ -3,7 +3,7 @@
 from typing import Any, ClassVar
 
 from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import Verdict
+from sea_ident.discrepancy.findings import Verdict, chance
 from sea_ident.report.section import DiagnosisSection
 
 MEANING = {
@@ -47,6 +47,8 @@ class VerdictSection(DiagnosisSection):
             "lack": lack,
             "equations": equations,
             "fit_level": _level(lack.p_value),
+            "fit_chance": chance(lack.p_value).removeprefix("= "),
+            "trend_chance": chance(lack.trend_p_value).removeprefix("= "),
             "trend_level": _level(lack.trend_p_value),
             "warnings": diagnosis.warnings,
         }

@@ -1,0 +1,74 @@
+"""A held-out recording that is the recording itself is refused, however it was written; another one is not."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.same import not_the_same
+from sea_ident.exceptions import DiagnosisError
+from sea_ident.recordings import Recording
+
+SAMPLES = 3000
+INTERVAL = 0.005
+
+
+def recording(seed, name="a.csv", noise=1e-4, samples=SAMPLES):
+    """Three periods of one motion with noise of its own."""
+    time = np.arange(samples) * INTERVAL
+    phase = 2.0 * np.pi * time / (INTERVAL * 1000)
+    clean = {"q_hip": np.sin(phase), "current_hip": np.cos(2.0 * phase), "q_knee": np.sin(3.0 * phase)}
+    rng = np.random.default_rng(seed)
+    columns = {key: values + noise * rng.standard_normal(samples) for key, values in clean.items()}
+    return Recording(time=time, columns=columns, source=name)
+
+
+def changed(original, change):
+    time = original.time[: len(change(original.time))]
+    columns = {key: change(values) for key, values in original.columns.items()}
+    return Recording(time=time, columns=columns, source="b.csv")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda x: x,
+        lambda x: np.round(x, 5),
+        lambda x: np.round(x[700:], 5),
+        lambda x: x[1234:],
+        lambda x: x[:1700].astype(np.float32).astype(np.float64),
+        lambda x: x + 1e-6 * np.random.default_rng(9).standard_normal(len(x)),
+    ],
+)
+def test_a_copy_is_refused_however_it_was_written(change):
+    first = recording(1)
+    second = changed(first, change)
+    for pair in ((first, second), (second, first)):
+        with pytest.raises(DiagnosisError, match="it proves nothing"):
+            not_the_same(*pair)
+
+
+def test_a_copy_with_a_column_more_is_refused():
+    first = recording(1)
+    second = Recording(time=first.time, columns={**first.columns, "theta_hip": first.columns["q_hip"]}, source="b.csv")
+    with pytest.raises(DiagnosisError, match="3000 of 3000"):
+        not_the_same(first, second)
+
+
+def test_the_same_motion_measured_again_is_no_copy():
+    for seed in range(2, 12):
+        not_the_same(recording(1), recording(seed))
+
+
+def test_the_same_motion_measured_again_by_coarse_sensors_is_no_copy():
+    first, second = (changed(recording(seed, noise=1e-3), lambda x: 1e-3 * np.round(x / 1e-3)) for seed in (1, 2))
+    not_the_same(first, second)
+
+
+def test_without_noise_a_motion_of_other_friction_is_no_copy():
+    first = recording(1, noise=0.0)
+    columns = {key: values + 1e-3 * np.sign(first.columns["q_hip"]) for key, values in first.columns.items()}
+    not_the_same(first, Recording(time=first.time, columns=columns, source="b.csv"))
+
+
+def test_less_than_half_in_common_is_another_recording():
+    whole = recording(1, samples=5000)
+    not_the_same(changed(whole, lambda x: x[:3000]), changed(whole, lambda x: x[2000:]))
