@@ -8,13 +8,13 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit, Known
-from sea_ident.discrepancy.free_shapes import free_shapes, moved, signal_effects
+from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, span
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Parts, Whitening
-from sea_ident.effects import Effect, Side
+from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.regressor import prior_parameters
 
@@ -256,18 +256,6 @@ class Bench(Tangents):
             stiffer = np.flatnonzero(slopes[e])
             out[:, e, stiffer] += scale[e] * np.outer(residual[:, e], slopes[e, stiffer] / stiffness[e])
         return out
-
-    def stiffness_of(self, fit: Fit) -> FloatArray:
-        """(E,) slope of the springs of a fit over their deflection."""
-        counts, signals = self.counts(fit.effects), signal_effects(fit.effects)
-        begins = np.cumsum([0, *counts])
-        total = np.zeros(len(self.data.equations))
-        for effect, begin, count in zip(fit.effects, begins, counts, strict=False):
-            columns = fit.columns[begin : begin + count]
-            if any(column.side is Side.SPRING for column in columns):
-                slopes = self.stiffness_slopes(columns, self.columns_behind(effect, signals), fit.effects)
-                total += slopes @ fit.values[begin : begin + count]
-        return total
 
     @cached_property
     def first_fit(self) -> Fit:

@@ -10,6 +10,7 @@ import pinocchio as pin
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Columns
 from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import distance, moved, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Contribution, Effect, JointEffect, Shape, Side, State, corrected_motion
@@ -47,6 +48,18 @@ class Tangents(Columns):
             if own:
                 out[e, own] = _slope(design[1:, e, own], deflection)
         return out
+
+    def stiffness_of(self, fit: Fit) -> FloatArray:
+        """(E,) slope of the springs of a fit over their deflection."""
+        counts, signals = self.counts(fit.effects), signal_effects(fit.effects)
+        begins = np.cumsum([0, *counts])
+        total = np.zeros(len(self.data.equations))
+        for effect, begin, count in zip(fit.effects, begins, counts, strict=False):
+            columns = fit.columns[begin : begin + count]
+            if any(column.side is Side.SPRING for column in columns):
+                slopes = self.stiffness_slopes(columns, self.columns_behind(effect, signals), fit.effects)
+                total += slopes @ fit.values[begin : begin + count]
+        return total
 
     @cached_property
     def links(self) -> tuple[int, ...]:
