@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.effects import effect_classes, make_effect
 from sea_ident.effects.drift import TrendEffect
@@ -179,3 +180,11 @@ def test_a_model_as_it_is_has_the_scale_that_its_fit_has(nothing_missing):
     bench, now = nothing_missing
     fit = now.fit
     np.testing.assert_allclose(bench.predicted(fit.effects, fit.parameters).scale, fit.scale, rtol=1e-12)
+
+
+def test_a_motion_without_torques_has_residuals_of_no_scale(nothing_missing):
+    bench, now = nothing_missing
+    data = replace(bench.data, tau_motor=np.zeros_like(bench.data.tau_motor))
+    fit = Bench(data, bench.effects).predicted(now.fit.effects, now.fit.parameters)
+    np.testing.assert_array_equal(fit.scale, 1.0)
+    assert np.all(np.isfinite(fit.residual))
