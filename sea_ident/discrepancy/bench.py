@@ -211,7 +211,12 @@ class Bench(Tangents):
 
     @cached_property
     def first_stiffness(self) -> FloatArray:
-        """(E,) mean slope of the spring torque over the deflection in the first fit, 0 where there is no spring."""
+        """(E,) mean slope of the spring torque over the deflection in the first fit, 0 where there is no spring.
+
+        A motion that was only designed has no torques, and nothing to be fitted to.
+        """
+        if not np.any(self._target):
+            return np.zeros(len(self.data.equations))
         fit = self.first_fit
         slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects), fit.effects) @ fit.values
         for e, equation in enumerate(self.data.equations):

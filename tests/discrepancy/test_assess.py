@@ -46,13 +46,16 @@ SAME_TORQUE = [
 ]
 
 
-def test_play_that_never_closes_and_a_kink_never_passed_are_declared_beside_an_offset(preloaded):
+def test_a_kink_never_passed_is_declared_beside_an_offset_and_play_before_a_stiffening_spring_is_not(
+    preloaded,
+):
     bench, _, selection = preloaded
     first = len(selection.start.fit.effects)
     found = declared(rivals(bench, selection))
     hip, knee = ({a.effect for a in found[position] if a.joint == joint} for position, joint in
                  ((first, "hip"), (first + 1, "knee")))  # fmt: skip
-    assert {"backlash", "asymmetric_spring"} <= hip
+    assert "asymmetric_spring" in hip
+    assert "backlash" not in hip
     assert not {"backlash", "asymmetric_spring"} & knee
 
 
@@ -107,9 +110,14 @@ def test_more_parameters_are_no_alternative_unless_another_motion_asks_for_them(
     assert declared(listed) == {first: (), first + 1: ()}
     _, left, _ = decide(bench, selection, listed, tried(other, selection, "another motion"))
     assert left[first] == ()
-    # now the motion that decides shows that what was named does not hold
+
+
+def test_a_shape_that_the_first_motion_leaves_open_is_taken_as_the_other_has_it(preloaded):
+    bench, other, selection = preloaded
+    first = len(selection.start.fit.effects)
     own = written_as(preloaded, make_effect("backlash", "hip", half_width=0.007))
-    wrong = replace(selection, final=Settled(own, selection.final.noise))
-    listed = {first: (Alternative("spring_offset", "hip", 1.0, selection.final.fit, dearer=True),), first + 1: ()}
-    chosen, _, _ = decide(bench, wrong, listed, tried(other, wrong, "another motion"))
-    assert chosen.effects[0].name == "spring_offset"
+    wide = replace(selection, final=Settled(own, selection.final.noise))
+    before = tried(other, wide, "another motion")
+    chosen, _, held = decide(bench, wide, {first: (), first + 1: ()}, before)
+    assert chosen.effects[0].half_width < 0.005
+    assert held.transfers[0].statistic < before.transfers[0].statistic - 50.0

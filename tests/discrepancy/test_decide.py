@@ -28,11 +28,11 @@ def rivals(laboratory):
     return bench, other, start, fits
 
 
-def decided(rivals, own, alternative):
+def decided(rivals, own, alternative, *, dearer=False):
     bench, other, start, fits = rivals
     position = len(start.fit.effects)
     selection = Selection(start, Settled(fits[own], start.noise), 1, (1e-9,))
-    listed = {position: (Alternative(alternative, JOINT, 1.0, fits[alternative]),)}
+    listed = {position: (Alternative(alternative, JOINT, 1.0, fits[alternative], dearer),)}
     held = tried(other, selection, "another motion")
     selection, left, held = decide(bench, selection, listed, held)
     return selection.effects[0].name, [a.effect for a in left[position]], held
@@ -48,6 +48,11 @@ def test_what_holds_on_the_other_motion_is_taken(rivals):
 def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
     name, left, _ = decided(rivals, "spring_offset", "spring_hysteresis")
     assert (name, left) == ("spring_offset", [])
+
+
+def test_what_takes_more_parameters_is_taken_where_the_other_motion_asks_for_it_only(rivals):
+    assert decided(rivals, "spring_hysteresis", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
+    assert decided(rivals, "spring_offset", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
 
 
 def test_what_holds_there_as_well_stays_possible(rivals):

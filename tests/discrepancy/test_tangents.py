@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.effects import corrected_motion, effect_classes, make_effect
 from sea_ident.effects.drift import TrendEffect
@@ -204,3 +205,11 @@ def test_bodies_without_mass_and_rotors_without_inertia(nothing_missing, less):
     # the torque is linear in these parameters, however each of the three is computed
     assert np.abs(own).max() > 0.0
     np.testing.assert_allclose(rest + own, whole, atol=1e-10 * np.abs(whole).max())
+
+
+def test_a_motion_without_torques_has_residuals_of_no_scale(nothing_missing):
+    bench, now = nothing_missing
+    data = replace(bench.data, tau_motor=np.zeros_like(bench.data.tau_motor))
+    fit = Bench(data, bench.effects).predicted(now.fit.effects, now.fit.parameters)
+    np.testing.assert_array_equal(fit.scale, 1.0)
+    assert np.all(np.isfinite(fit.residual))
