@@ -1,5 +1,7 @@
 """Scatter of the periods along the columns of trends: what it is, and what a trend is worth in it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,7 @@ def test_a_course_that_is_not_that_of_the_library_leaves_nothing_to_another_tren
     rng = np.random.default_rng(16)
     own = direction(rng, 12, 20, 1)
     other = direction(rng, 12, 20, columns=own.columns[0] + 0.1 * rng.standard_normal((20, 1)), joint="knee")
+    other = replace(other, profile=own.bend)
     flat = 5.0 * (own.profile + 0.5 * own.bend)[:, None] * (own.columns @ [1.0])
     assert gain(flat, other)[0] > 1.0
     assert gain(flat, other, held_basis([own]))[0] < 1e-9 * np.sum(flat**2)
