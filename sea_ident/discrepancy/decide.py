@@ -56,8 +56,11 @@ def simplest_first(
                            for a in others)  # fmt: skip
         best, price = None, now.statistic + penalty(own, bench) - CLEARLY
         for other in others:
-            if other.fit is not None and other.fit.statistic + penalty(other.fit.effects[position], bench) < price:
-                best, price = other, other.fit.statistic + penalty(other.fit.effects[position], bench)
+            if other.fit is None:
+                continue
+            own_price = penalty(other.fit.effects[position], bench)
+            if own_price < penalty(own, bench) and other.fit.statistic + own_price < price:
+                best, price = other, other.fit.statistic + own_price
         if best is not None and best.fit is not None:
             selection = replace(selection, final=Settled(best.fit, selection.final.noise))
             out = Alternative(own.name, own.joint, best.cos2, now)
