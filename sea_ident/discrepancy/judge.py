@@ -89,12 +89,15 @@ def at_a_bound(effect: Effect) -> bool:
 
 
 def too_short(bench: Bench, effect: Effect) -> bool:
-    """Whether a push is shorter than what is compared can show: then it only stands in for something sudden."""
+    """Whether a push, or the pause before it comes again, is shorter than what is compared can show.
+
+    Then it only stands in for something sudden, or for a constant.
+    """
     if not isinstance(effect, ExternalForce):
         return False
     period = bench.data.period
     length = float(np.mod(effect.stop - effect.start, period)) + period / bench.data.samples
-    return length < period / (2.0 * bench.data.harmonics)
+    return min(length, period - length) < period / (2.0 * bench.data.harmonics)
 
 
 def torque_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:

@@ -322,7 +322,7 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
             better = best.statistic + penalty(best.effects[position], bench)
             slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
-            if slack or not physical(bench, new, position):
+            if slack or not physical(bench, new, position) or too_short(bench, new.effects[position]):
                 continue
             if new.statistic + penalty(candidate.effect, bench) < better - 1.0:
                 best = new
