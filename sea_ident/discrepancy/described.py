@@ -5,7 +5,7 @@ do without that torque, until they have lost their stiffness or their sign, and 
 error. From springs that are known to a part of themselves the way is straight.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,9 @@ MOST_ROUNDS = 10
 STANDS = 1e-3
 """A step that takes less than this share of what is left was the last [-]."""
 
+BENT = 1.5
+"""Factor between the stiffness of a spring and its description beyond which a model has bent it [-]."""
+
 ELSEWHERE = 0.2
 """Share of an amount from which on a difference makes it another place [-]."""
 
@@ -47,7 +50,7 @@ class Beginning:
     left: FloatArray
 
 
-def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFloor) -> Fit:
+def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFloor, start: Mapping[str, float]) -> Fit:
     """A model whose effect in the chain of signals may have ended in the wrong place, begun from described springs.
 
     Args:
@@ -55,12 +58,16 @@ def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFl
         fit: the model.
         position: of the effect in it.
         noise: noise floor.
+        start: parameters that the fit was begun from.
 
     Returns:
-        The fit that comes of the other beginning where that is another place and better, else the fit as it is.
+        The fit that comes of the other beginning where springs have bent, that is another place and better; else the
+        fit as it is.
     """
     before, effect, after = fit.effects[:position], fit.effects[position], fit.effects[position + 1 :]
-    if not isinstance(effect, SignalEffect):
+    if not isinstance(effect, SignalEffect) or not any(
+        _bent(bench, effect, known) for known in (start, fit.parameters)
+    ):
         return fit
     begun = begin_as_described(bench, before, effect, after)
     if begun is None or not _elsewhere(effect, begun.effect):
@@ -73,6 +80,15 @@ def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFl
     right = bench.refine(model, own, start=begun.parameters, only=len(bench.effects))
     new = bench.refine(right.effects, noise, start=right.parameters, only=len(bench.effects))
     return min((fit, new), key=lambda one: (len(bench.slack_links(one)), one.statistic))
+
+
+def _bent(bench: Bench, effect: SignalEffect, parameters: Mapping[str, float]) -> bool:
+    """Whether the spring at the joint of an effect is further from its description than springs are."""
+    stiffness = parameters.get(f"{effect.joint}.spring_stiffness")
+    if effect.joint is None or stiffness is None:
+        return False
+    described = bench.robot.spring(effect.joint).stiffness
+    return described is not None and not 1.0 / BENT < stiffness / described < BENT
 
 
 def _elsewhere(one: SignalEffect, other: SignalEffect) -> bool:

@@ -266,7 +266,7 @@ def refitted(
     fits = [bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun]
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     if isinstance(effect, SignalEffect):
-        best = from_described_springs(bench, best, len(before), noise)
+        best = from_described_springs(bench, best, len(before), noise, start)
     if isinstance(effect, SpringEffect):
         # the law of the spring was another one as long as the effect was missing
         anchored = list(best.effects)
