@@ -52,8 +52,10 @@ def simplest_first(
         now = selection.final.fit
         own = now.effects[position]
         if changed:
-            others = tuple(replace(a, fit=None if a.fit is None else _beside(bench, selection, position, a.fit))
-                           for a in others)  # fmt: skip
+            # they were fitted beside an effect that is out by now
+            others = tuple(
+                replace(a, fit=None if a.fit is None else _beside(bench, selection, position, a.fit)) for a in others
+            )
         best, price = None, now.statistic + penalty(own, bench) - CLEARLY
         for other in others:
             if other.fit is None:
