@@ -84,7 +84,8 @@ class Passes:
                 self._keep(begin + k * h, k, state)
             for _ in range(self._clock.substeps):
                 try:
-                    state = system.step(begin + k * h, biases[k], state)
+                    with np.errstate(over="ignore", invalid="ignore"):  # what diverges is told as such
+                        state = system.step(begin + k * h, biases[k], state)
                 except (SimulationError, OverflowError) as error:
                     raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
                 k += 1

@@ -3,11 +3,14 @@ import pytest
 from plants import Wave, from_parts, joint, link, modest_series, motor, quietly, ur10
 
 from sea_ident import FourierSeries, Motion, SeaIdentError, design_excitation, load_robot
+from sea_ident.effects import make_effect
 from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.exceptions import SimulationError
 from sea_ident.regressor import inverse_dynamics
 from sea_ident.simulation import (
     ComputedTorque,
     FrictionJitter,
+    PlantedEffect,
     SensorNoise,
     Settling,
     SmoothCoulomb,
@@ -126,6 +129,13 @@ def test_diverging_motion_names_joint_and_time():
     pushing = Wave((1.0,), 1.0, (-4000.0,), (-50.0,))
     with pytest.raises(SeaIdentError, match=r"diverged at -?\d+\.\d+ s.*'swing'"):
         simulate(robot, modest_series(robot), controller=pushing)
+
+
+@pytest.mark.parametrize("friction", [-1e6, -1e150])
+def test_motion_that_overflows_is_told_and_numpy_says_nothing(leg, friction):
+    pushed = PlantedEffect(make_effect("link_friction", "ankle"), np.array([0.0, friction]))
+    with pytest.raises(SimulationError, match="the simulation diverged at"):
+        simulate(leg, modest_series(leg), periods=1, seed=0, effects=[pushed])
 
 
 def test_missing_stiffness_is_named():
