@@ -16,6 +16,7 @@ from sea_ident.discrepancy.findings import (
     Alternative,
     Gap,
     LackOfFit,
+    Location,
     MissingEffect,
     MissingParameter,
     Verdict,
@@ -125,8 +126,7 @@ def conclude(
         lack_of_fit=LackOfFit(
             statistic, dof, p_value, trends.p_value, _per_joint(confirmed.bench, confirmed.start), remainder
         ),
-        # of what is tested: away from the reversals, where the mean of signs is no model
-        locations=locate(confirmed.bench, confirmed.start.fit, confirmed.start.noise),
+        locations=_locations(bench, confirmed),
         missing=tuple(missing),
         training=gap,
         holdout=held_gap,
@@ -137,6 +137,18 @@ def conclude(
         holdout_source=None if held is None else held.source,
     )
     return without_sizes(found) if lost else found
+
+
+def _locations(bench: Bench, confirmed: Confirmed) -> tuple[Location, ...]:
+    """Where model and data disagree among what is tested: away from reversals, where the mean of signs is no model.
+
+    What was found mostly near them has its place there.
+    """
+    away = locate(confirmed.bench, confirmed.start.fit, confirmed.start.noise)
+    if away or not confirmed.selection.added:
+        return away
+    start = confirmed.selection.start
+    return locate(bench, start.fit, start.noise)
 
 
 def without_sizes(diagnosis: Diagnosis) -> Diagnosis:

@@ -4,7 +4,7 @@ The effect that the library lacks is planted from here and never registered.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,9 +12,12 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.conclude import explains, predicts, without_sizes
+from sea_ident.discrepancy.conclude import _locations, explains, predicts, without_sizes
+from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
+from sea_ident.discrepancy.locate import locate
+from sea_ident.discrepancy.search import Selection
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
 from sea_ident.exceptions import SeaIdentWarning
 
@@ -118,3 +121,12 @@ def test_what_predicts_worse_than_no_model_does_not_hold_there():
     wild = Gap({"hip": 900.0, "knee": 0.0}, {"hip": 600.0, "knee": 0.0}, noise)
     assert explains(Gap({"hip": 1.0}, {"hip": 0.0}, {"hip": 0.1}), wild)
     assert not predicts(wild, torque)
+
+
+def test_what_only_the_samples_near_reversals_show_has_its_place_there(rippled):
+    bench, start, final = rippled
+    assert locate(bench, final.fit, final.noise) == ()
+    silent = Confirmed(Selection(start, final, 1, (1e-9,)), bench, final, final)
+    places = _locations(bench, silent)
+    assert (places[0].joint, places[0].equation) == ("hip", "motor")
+    assert _locations(bench, replace(silent, selection=replace(silent.selection, added=0))) == ()
