@@ -19,6 +19,9 @@ from sea_ident.discrepancy.trend_values import Course, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 
+SURE = 3.0
+"""Standard deviations by which a value of a trend that bends must differ from zero, its course free [-]."""
+
 LEVEL = 1e-3
 """Probability of naming a trend where there is none."""
 
@@ -70,6 +73,11 @@ class Trend:
     torque_change: float
     alternatives: tuple[tuple[Effect, float], ...] = ()
     time_constant_std: float = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether any value is known well enough to be there: what is over within a period or two tells no rate."""
+        return bool(np.any(np.abs(self.values) > SURE * self.stds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +169,11 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value
     trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
+    short = [c.direction.bent and not trend.known for c, trend in zip(chosen, trends, strict=True)]
+    if any(short):
+        notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
+        chosen = [c for c, over in zip(chosen, short, strict=True) if not over]
+        trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
@@ -231,6 +244,16 @@ def _apart(first: FloatArray, later: FloatArray) -> float:
     spread = float(np.sum(np.diff(later, axis=0) ** 2)) / (2.0 * (len(later) - 1))
     ratio = float(difference @ difference) / max(spread, 1e-300)
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(later))))
+
+
+def _over_too_soon(bench: Bench, trend: Trend) -> str:
+    effect = trend.effect
+    place = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
+    return (
+        f"{bench.data.source}: the first periods differ as {place} would make them, but it is over so soon (within "
+        f"about {getattr(effect, 'time_constant', 0.0):.2g} s) that its rate is not known: it is not named. Record "
+        "more periods from the same start, or start recording later"
+    )
 
 
 class _Change:

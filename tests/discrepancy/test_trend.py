@@ -166,3 +166,14 @@ def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
     knee = [e for e, eq in enumerate(bench.data.equations) if (eq.joint, str(eq.kind)) == ("knee", "motor")]
     friction = bench.data.rows(effect.steady(bench.state(now.fit.effects)))[:, knee[0], 1]
     np.testing.assert_allclose(known[:, knee[0]], 0.1 * saw * friction, atol=1e-12)
+
+
+@pytest.mark.parametrize(("time_constant", "named"), [(4.0, False), (7.0, True)])
+def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_constant, named):
+    planted = [("torque_constant_drift", "hip", [0.4], {"time_constant": time_constant})]
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    now = settle(bench, bench.effects)
+    found = compare_periods(bench, now.fit, now.noise)
+    assert found.p_value < 1e-3
+    assert [(t.effect.name, t.effect.joint) for t in found.trends] == [("torque_constant_drift", "hip")] * named
+    assert any("torque_constant_drift at hip" in note and "over so soon" in note for note in found.notes) is not named
