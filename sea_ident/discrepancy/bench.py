@@ -6,26 +6,16 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
-from sea_ident.discrepancy.fit import Fit, Known
+from sea_ident.discrepancy.data import PeriodData
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
-from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, span
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods, stacked
+from sea_ident.discrepancy.linear import off, span
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods
+from sea_ident.discrepancy.parameter_fits import ParameterFits
 from sea_ident.discrepancy.periods import Periods
-from sea_ident.discrepancy.tangents import Tangents
-from sea_ident.discrepancy.whitening import Parts, Whitening
+from sea_ident.discrepancy.whitening import Whitening
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
-from sea_ident.regressor import prior_parameters
-
-MOST_FIT_STEPS = 10
-"""Largest number of steps of a fit; a model that is right needs two."""
-
-LEAST_STIFFNESS = 0.02
-"""Share of the stiffness of the first fit below which that of another no longer scales its link equation."""
-
-WHITENINGS_KEPT = 3
-"""Noise floors of which whitened columns are kept."""
 
 NOISE_ROUNDS = 2
 """Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by. No more than
@@ -49,8 +39,8 @@ RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
 
 
-class Bench(Tangents):
-    """Fits models to one recording.
+class Bench(ParameterFits):
+    """Fits models to one recording, their shapes too, and finds its noise beside them.
 
     Args:
         data: the recording.
@@ -58,262 +48,8 @@ class Bench(Tangents):
     """
 
     def __init__(self, data: PeriodData, effects: Sequence[Effect]) -> None:
-        super().__init__(data)
-        self.effects = tuple(effects)
-        self._target = spectrum(data.target(data.tau_motor), data.harmonics)
-        self._left_out = data.left_out
-        self._free = free_samples(data.left_out, data.harmonics, data.alike)
-        self._whitenings: list[tuple[NoiseFloor | None, Whitening]] = []
+        super().__init__(data, effects)
         self._periods = Periods(data)
-
-    def release(self, effects: Sequence[Effect]) -> None:
-        """Leave out further samples: where torques of a model jump at the reversal of a speed of their own."""
-        left_out = self._left_out.copy()
-        for effect in effects:
-            turning = effect.turning(self.data.motion, self.robot)
-            if turning is not None:
-                rows = around_reversal(turning[1])
-                for e, equation in enumerate(self.data.equations):
-                    if equation.index == turning[0] and equation.kind is not EquationKind.LINK:
-                        left_out[:, e] |= rows
-        if np.any(left_out != self._left_out):
-            self._left_out, self._whitenings = left_out, []
-            self._free = free_samples(left_out, self.data.harmonics, self.data.alike)
-
-    def predicted(self, effects: Sequence[Effect], parameters: Mapping[str, float]) -> Fit:
-        """A model with given parameters, nothing fitted."""
-        effects, columns = tuple(effects), self.labels(effects)
-        values = np.array([parameters.get(column.name, 0.0) for column in columns])
-        design = self.design(effects)
-        residual = self._target - design @ values
-        scale = self._link_scale(self.stiffness_slopes(columns, design, effects) @ values)
-        flat = stacked(residual)
-        nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
-        empty = np.zeros((len(flat), 0))
-        return Fit(effects, columns, values, residual, scale, flat, empty, empty, nothing, ())
-
-    def fit(
-        self,
-        effects: Sequence[Effect],
-        noise: NoiseFloor | None,
-        *,
-        start: Mapping[str, float] | None = None,
-        tangents: bool = True,
-        known: Known | None = None,
-    ) -> Fit:
-        """Fit the parameters of a model, its shapes held.
-
-        A link equation has nothing on its right-hand side: smaller parameters always leave a smaller residual. So its
-        residual is measured in deflection, that is divided by the stiffness of its own fit (and multiplied by that of
-        the first fit, to stay a torque). The scale of the parameters then comes from the motor equations alone.
-
-        Args:
-            effects: the model.
-            noise: noise floor; without one all equations count alike, and no scale can go wrong.
-            start: parameters by name to start from; those of the unweighted fit by default.
-            tangents: whether shapes are free in what is said about degrees of freedom and covariance.
-            known: what is there beside the model.
-
-        Returns:
-            The fit.
-        """
-        effects = tuple(effects)
-        columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
-        target = self._target if known is None else self._target - known.torque
-        beside = np.zeros(len(self.data.equations)) if known is None else known.stiffness
-        parts = whitening.design(effects)
-        whole = self._whole(whitening) if known is None else whitening.in_parts(target[:, :, None]) @ np.ones(1)
-        slopes = self.stiffness_slopes(columns, design, effects)
-        values = np.nan_to_num(prior_parameters(self.robot, effects))
-        if start is None and noise is not None:
-            start = self.fit(effects, None, tangents=False).parameters
-        if start is not None:
-            values = np.array([start.get(column.name, 0.0) for column in columns])
-        scale = np.ones(len(self.data.equations))
-        if noise is None:
-            factors = whitening.factors(scale)
-            values = values + least_squares(parts.scaled(factors), factors @ (whole - parts @ values))[0]
-            frame = None
-        else:
-            values, frame = self._descend(parts, whole, whitening, slopes, beside, values)
-            scale = self._link_scale(slopes @ values + beside)
-        left = whole - parts @ values
-        factors = whitening.factors(scale)
-        whitened = factors @ left
-        residual = target - design @ values
-        if noise is None:
-            directions, spectra = parts.scaled(factors), design
-        else:
-            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
-            spectra = self.scaled(design, slopes, residual, scale, slopes @ values + beside)
-        shapes = free_shapes(effects) if tangents else ()
-        if shapes:
-            tangent = self.tangents(effects, columns, values, shapes)
-            bent = self.scaled(*tangent, residual, scale, slopes @ values + beside)
-            directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
-            spectra = np.concatenate([spectra, bent], axis=2)
-            frame = None
-        free = whitening.free
-        return Fit(effects, columns, values, residual, scale, whitened, free, directions, spectra, shapes, frame)
-
-    def _descend(
-        self,
-        parts: Parts,
-        whole: FloatArray,
-        whitening: Whitening,
-        slopes: FloatArray,
-        beside: FloatArray,
-        values: FloatArray,
-    ) -> tuple[FloatArray, FloatArray | None]:
-        """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness.
-
-        And the frame (p, r) of the first step: between steps columns change by that scale alone.
-        """
-        cost, best, step = np.inf, values, np.zeros(len(values))
-        frame: FloatArray | None = None
-        for _ in range(MOST_FIT_STEPS):
-            left = whole - parts @ values
-            scale = self._link_scale(slopes @ values + beside)
-            whitened = whitening.factors(scale) @ left
-            new_cost = float(whitened @ whitened)
-            tight, before = (self._scaled_links(slopes @ each + beside) for each in (values, best))
-            gone = len(tight) < len(before)
-            if gone or not new_cost <= cost * (1.0 + 1e-9):
-                step = 0.3 * step
-                values = best + step
-                continue
-            converged = cost - new_cost < 1e-3 + 1e-6 * new_cost
-            cost, best = new_cost, values
-            if converged:
-                break
-            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
-            if frame is None:
-                step, frame = least_squares(flat, whitened)
-            else:
-                step = least_squares_near(frame, flat, whitened)
-            values = values + step
-        return best, frame
-
-    def _link_scale(self, stiffness: FloatArray) -> FloatArray:
-        """(E,) factor of the residual of each equation: for links the stiffness of the first fit over that of this."""
-        first = self.first_stiffness
-        return np.where(first > 0.0, first / np.maximum(stiffness, LEAST_STIFFNESS * first + 1e-300), 1.0)
-
-    def slack_links(self, fit: Fit) -> list[int]:
-        """Link equations of springs that have lost their stiffness in a fit: they explain nothing, at no price."""
-        tight = self._scaled_links(self.stiffness_of(fit))
-        return [e for e in self.links if self.first_stiffness[e] > 0.0 and e not in tight]
-
-    def _scaled_links(self, stiffness: FloatArray) -> list[int]:
-        """Link equations of which the scale follows the stiffness (E,)."""
-        first = self.first_stiffness
-        return [e for e in self.links if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
-
-    @cached_property
-    def first_stiffness(self) -> FloatArray:
-        """(E,) mean slope of the spring torque over the deflection in the first fit, 0 where there is no spring.
-
-        A motion that was only designed has no torques, and nothing to be fitted to.
-        """
-        if not np.any(self._target):
-            return np.zeros(len(self.data.equations))
-        fit = self.first_fit
-        slopes = self.stiffness_slopes(fit.columns, self.design(fit.effects), fit.effects) @ fit.values
-        for e, equation in enumerate(self.data.equations):
-            if equation.kind is EquationKind.LINK:
-                known = self.robot.spring(equation.joint).stiffness or 0.0
-                slopes[e] = max(slopes[e], 0.2 * known)
-        return np.asarray(np.maximum(slopes, 0.0), dtype=np.float64)
-
-    def _flat_columns(
-        self,
-        parts: Parts,
-        left: FloatArray,
-        whitening: Whitening,
-        slopes: FloatArray,
-        scale: FloatArray,
-        stiffness: FloatArray,
-    ) -> FloatArray:
-        """(M, p) whitened decrease of the scaled residual with every parameter: `scaled`, in parts."""
-        out = parts.scaled(whitening.factors(scale))
-        for e in self._scaled_links(stiffness):
-            for k in np.flatnonzero(slopes[e]):
-                out[:, k] += scale[e] * slopes[e, k] / stiffness[e] * left[whitening.parts[e]]
-        return out
-
-    def scaled(
-        self, change: ComplexArray, slopes: FloatArray, residual: ComplexArray, scale: FloatArray, stiffness: FloatArray
-    ) -> ComplexArray:
-        """Decrease of the scaled residual where the model torque changes, and the stiffness that scales it.
-
-        Args:
-            change: (H + 1, E, k) change of the model torque.
-            slopes: (E, k) change of the stiffness with it.
-            residual: (H + 1, E).
-            scale: (E,) factor of the residual.
-            stiffness: (E,) of the springs in the link equations.
-
-        Returns:
-            (H + 1, E, k).
-        """
-        out = change * scale[:, None]
-        for e in self._scaled_links(stiffness):
-            stiffer = np.flatnonzero(slopes[e])
-            out[:, e, stiffer] += scale[e] * np.outer(residual[:, e], slopes[e, stiffer] / stiffness[e])
-        return out
-
-    @cached_property
-    def first_fit(self) -> Fit:
-        """The model that is diagnosed, all equations counting alike: no weight can pull its parameters to zero."""
-        return self.fit(self.effects, None, tangents=False)
-
-    def whitening(self, noise: NoiseFloor | None) -> Whitening:
-        """A noise floor and the samples that are left out, applied to torques; the last ones are kept."""
-        for known, kept in self._whitenings:
-            if known is noise:
-                return kept
-        made = Whitening(self, self._plain_whitener() if noise is None else noise.whitener(), self._free)
-        self._whitenings = [*self._whitenings[1 - WHITENINGS_KEPT :], (noise, made)]
-        return made
-
-    def _whole(self, whitening: Whitening) -> FloatArray:
-        """(G, M) target in parts."""
-        if whitening.target is None:
-            whitening.target = whitening.in_parts(self._target[:, :, None]) @ np.ones(1)
-        return whitening.target
-
-    def free_basis(self, noise: NoiseFloor | None) -> FloatArray:
-        """(M, m) orthonormal basis of the samples that are left out, whitened."""
-        return self.whitening(noise).free
-
-    def statistic(self, fit: Fit, noise: NoiseFloor) -> float:
-        """Weighted sum of squares of the residual of a fit in another noise floor, without fitting again."""
-        left = self.whitening(noise).flat(fit.residual * fit.scale)
-        return float(left @ left)
-
-    def clean_residual(self, fit: Fit) -> ComplexArray:
-        """(H + 1, E) residual of a fit without what the samples that are left out put into it [N m].
-
-        All harmonics and equations count alike, whatever their noise: where something is missing, it would be spread to
-        where there is more noise, and to the samples of other equations that share it.
-        """
-        if not self._free.shape[2]:
-            return fit.residual
-        free = stacked(self._free)
-        amounts = np.linalg.lstsq(free, stacked(fit.residual), rcond=1e-8)[0]
-        cleaned: ComplexArray = fit.residual - self._free @ amounts
-        return cleaned
-
-    def whitener(self, noise: NoiseFloor | None) -> ComplexArray:
-        """(H + 1, E, E) whitening of a noise floor."""
-        return self.whitening(noise).whitener
-
-    def _plain_whitener(self) -> ComplexArray:
-        """(H + 1, E, E) whitening without a noise floor: every equation in its own torque."""
-        power = np.sqrt(np.sum(np.abs(self._target) ** 2, axis=0))
-        typical = float(np.max(power))
-        scale = np.diag(1.0 / np.where(power > 0.0, power, typical)).astype(np.complex128)
-        return np.broadcast_to(scale, (self.data.harmonics + 1, *scale.shape))
 
     def refine(
         self,

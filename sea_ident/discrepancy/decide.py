@@ -181,15 +181,17 @@ def _open_shapes(
         The model with another shape, and what it is worth on the other motion; the next one in a direction only where
         the last was better.
     """
+    # each compared with the fit as it was found in one and the same noise floor
     noise = bench.noise(fit)
-    enough = EQUALLY_GOOD * max(fit.statistic / max(fit.dof, 1), 1.0)
+    base = bench.fit(fit.effects, noise, start=fit.parameters)
+    enough = EQUALLY_GOOD * max(base.statistic / max(base.dof, 1), 1.0)
     for ways in _other_shapes(bench, fit, position):
         last = found
         for effect in ways:
             effects = list(fit.effects)
             effects[position] = effect
-            other = bench.fit(effects, noise, start=fit.parameters)
-            if other.statistic - fit.statistic > enough or not physical(bench, other, position):
+            other = bench.fit(effects, noise, start=base.parameters)
+            if other.statistic - base.statistic > enough or not physical(bench, other, position):
                 break
             there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
             result = there.transfers[position - len(effects) + selection.added]
