@@ -31,6 +31,9 @@ RUNAWAY_STEP = 1.2
 STANDS_STILL = 1e-3
 """A step of the shapes that takes less than this share of the excess was the last."""
 
+HOPE = 10.0
+"""How many times the gain of the last step all further ones together may bring: steps that shrink by a tenth each."""
+
 HELD = 1.0
 """Information about a shape (for its logarithm, or as a share of its range) below which it stays where it is: noise
 would carry it anywhere, and hold up the others."""
@@ -59,6 +62,7 @@ class Bench(ParameterFits):
         start: Mapping[str, float] | None = None,
         only: int = 0,
         rounds: int = 12,
+        beat: float = np.inf,
     ) -> Fit:
         """Fit parameters and shapes together: Gauss-Newton on the shapes, the parameters solved for in every step.
 
@@ -68,6 +72,7 @@ class Bench(ParameterFits):
             start: parameters to start from.
             only: position from which on shapes are refined; those before keep theirs, for a quick look.
             rounds: largest number of steps.
+            beat: statistic that is of interest; what is far above and comes down too slowly is given up.
 
         Returns:
             The fit.
@@ -79,7 +84,7 @@ class Bench(ParameterFits):
                 break
             gain = fit.statistic - better.statistic
             fit = better
-            if gain < 0.05 + STANDS_STILL * fit.excess:
+            if gain < 0.05 + STANDS_STILL * fit.excess or fit.statistic - HOPE * gain > beat:
                 break
         return self.fit(fit.effects, noise, start=fit.parameters)
 

@@ -102,8 +102,40 @@ LARGE_AMOUNT = 0.1
 SMALLER = 0.1
 """... with this part of it too [-]."""
 
+NO_BEGINNING = 3.0
+"""Times the statistic that comes of the estimate beyond which another amount is further from the truth than that."""
+
 CHALLENGERS = 3
 """Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
+
+OUTDONE = 0.5
+"""One that explains less than this share of what the effect does is not tried in its place again [-], ..."""
+
+PROMISES_MORE = 0.1
+"""... unless it promises more of that than it did, by this share of it [-]."""
+
+
+Key = tuple[str, str | None, str]
+
+
+@dataclass(frozen=True)
+class _Outdone:
+    """An effect that was tried in the place of another and did not take it.
+
+    Attributes:
+        promised: share of what the other explains that it promised to explain [-].
+        explained: share that it did, nothing where it cannot be [-].
+    """
+
+    promised: float
+    explained: float
+
+    def again(self, promised: float) -> bool:
+        """Whether it is worth another try by what it promises now [-]."""
+        return self.explained > OUTDONE or promised > self.promised + PROMISES_MORE
+
+
+_Tried = dict[tuple[Key, Key], _Outdone]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,12 +179,13 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
     now = start
     added: list[float] = []
     largest = np.zeros(len(bench.data.equations))
+    tried: _Tried = {}
     while True:
         candidates = scan(bench, now.fit, now.noise)
         tests = max(sum(c.tests for c in candidates), 1)
         if len(added) >= MOST_EFFECTS:
             break
-        step = _next(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest))
+        step = _next(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest), tried)
         if step is None:
             break
         new, p_value = step
@@ -165,7 +198,7 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
             now = settle_again(bench, now.fit)
             if now.fit.statistic / now.fit.dof > 0.98 * before:
                 break
-        now = _exchange(bench, now, len(added))
+        now = _exchange(bench, now, len(added), tried)
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
         if lost and now.fit.excess > SLOW * last.fit.excess:
             break
@@ -178,11 +211,12 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
 
 
 def _next(
-    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray
+    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray, tried: _Tried
 ) -> tuple[Fit, float] | None:
     """The best candidate refitted with everything free and its significance, None where none is worth it.
 
-    Of a candidate at least one equation must change by what is `smallest` (E,) there, as a share of the torque.
+    Of a candidate at least one equation must change by what is `smallest` (E,) there, as a share of the torque. What is
+    outdone by the best is noted among what was `tried`.
     """
     fit, noise = now.fit, now.noise
     worth = [
@@ -191,12 +225,17 @@ def _next(
     accepted: list[tuple[float, Fit, float]] = []
     periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
     most, explained = 0.0, False
+    refits: list[tuple[Candidate, float]] = []
     for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most and explained:
             continue
-        new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters)
+        leaders = sorted(new.statistic for _, new, _ in accepted)[:LAST_TWO]
+        # one that explains too little, or less than those that are compared in the end, need not be known exactly
+        beat = min([fit.statistic - _useful(bench, fit) * fit.excess, *leaders[LAST_TWO - 1 :]])
+        new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
+        refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
         if p_value > FAMILY_LEVEL or not _acceptable(bench, fit, new, periods, smallest):
             continue
         accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
@@ -210,7 +249,17 @@ def _next(
         score = whole.statistic + penalty(new.effects[-1], bench)
         if best is None or score < best[0]:
             best = (score, new, p_value)
-    return None if best is None else (best[1], best[2])
+    if best is None:
+        return None
+    own, whole_gain = effect_key(best[1].effects[-1]), fit.statistic - best[1].statistic
+    for candidate, gain in refits:
+        tried[own, candidate.key] = _Outdone(candidate.gain / whole_gain, gain / whole_gain)
+    return best[1], best[2]
+
+
+def _useful(bench: Bench, fit: Fit) -> float:
+    """Share of the excess that one effect more must explain [-]."""
+    return USEFUL_SHARE if len(fit.effects) - len(bench.effects) < MANY else USEFUL_BESIDE_MANY
 
 
 def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest: FloatArray) -> bool:
@@ -224,8 +273,7 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest:
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
     effect = new.effects[-1]
-    useful = USEFUL_SHARE if len(fit.effects) - len(bench.effects) < MANY else USEFUL_BESIDE_MANY
-    if fit.statistic - new.statistic < useful * fit.excess or not physical(bench, new, -1):
+    if fit.statistic - new.statistic < _useful(bench, fit) * fit.excess or not physical(bench, new, -1):
         return False
     if len(bench.slack_links(new)) > len(bench.slack_links(fit)) or at_a_bound(effect) or too_short(bench, effect):
         return False
@@ -254,8 +302,22 @@ def refitted(
     after: Sequence[Effect],
     noise: NoiseFloor,
     start: Mapping[str, float],
+    beat: float = np.inf,
 ) -> Fit:
-    """A model with one effect more, its shapes refined from the best of several beginnings."""
+    """A model with one effect more, its shapes refined from the best of several beginnings.
+
+    Args:
+        bench: the recording.
+        before: effects of the model that stand before it.
+        effect: the effect.
+        after: effects of the model that stand after it.
+        noise: noise floor.
+        start: parameters to start from.
+        beat: statistic that is of interest; what will stay above need not be exact.
+
+    Returns:
+        The fit.
+    """
     begun = [effect]
     if isinstance(effect, SignalEffect) and effect.beginnings:
         first = effect.amounts[0].name
@@ -263,7 +325,12 @@ def refitted(
     if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
         smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
         begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
-    fits = [bench.refine((*before, e, *after), noise, start=start, only=len(bench.effects)) for e in begun]
+    fits: list[Fit] = []
+    for each in begun:
+        model = (*before, each, *after)
+        if fits and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
+            continue
+        fits.append(bench.refine(model, noise, start=start, only=len(bench.effects), beat=beat))
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     if isinstance(effect, SignalEffect):
         best = from_described_springs(bench, best, len(before), noise, start)
@@ -272,7 +339,7 @@ def refitted(
         anchored = list(best.effects)
         anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
         if tuple(anchored) != best.effects:
-            best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects))
+            best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects), beat=beat)
     return with_sharp_edges(bench, best, noise, len(before))
 
 
@@ -303,7 +370,7 @@ def kind_of(effect: Effect) -> str:
     return effect.name if is_signal(effect) else str(effect.side)
 
 
-def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
+def _exchange(bench: Bench, now: Settled, added: int, tried: _Tried) -> Settled:
     """Replace effects that were added by better ones, now that the others are there and the noise floor is right."""
     first = len(now.fit.effects) - added
     for position in range(first, first + added):
@@ -312,19 +379,24 @@ def _exchange(bench: Bench, now: Settled, added: int) -> Settled:
             continue
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
-        own = effect_key(fit.effects[position])
+        own, explained = effect_key(fit.effects[position]), max(reduced.statistic - fit.statistic, 1e-300)
         best = fit
         rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
-            promised = LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5
-            if candidate.gain < promised * (reduced.statistic - fit.statistic):
+            promised = candidate.gain / explained
+            last = tried.get((own, candidate.key))
+            if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
                 continue
-            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
-            better = best.statistic + penalty(best.effects[position], bench)
+            if last is not None and not last.again(promised):
+                continue
+            better = best.statistic + penalty(best.effects[position], bench) - 1.0
+            beat = better - penalty(candidate.effect, bench)
+            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
-            if slack or not physical(bench, new, position) or too_short(bench, new.effects[position]):
-                continue
-            if new.statistic + penalty(candidate.effect, bench) < better - 1.0:
+            possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
+            gain = reduced.statistic - new.statistic if possible else 0.0
+            tried[own, candidate.key] = _Outdone(promised, gain / explained)
+            if possible and new.statistic < beat:
                 best = new
         if best is not fit:
             now = settle_again(bench, best)

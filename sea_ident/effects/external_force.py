@@ -53,8 +53,7 @@ class ExternalForce(Effect):
 
     def evaluate(self, state: State) -> Contribution:
         """-J' while it pushes."""
-        jacobian = _jacobians(state, self._body(state.robot))
-        link = np.where(self.pushes(state.motion.time)[:, None, None], -jacobian, 0.0)
+        link = -_jacobians(state, self._body(state.robot), self.pushes(state.motion.time))
         return Contribution(link, np.broadcast_to(0.0, link.shape))
 
     def pushes(self, time: FloatArray) -> NDArray[np.bool_]:
@@ -98,15 +97,22 @@ class ExternalForce(Effect):
         return int(robot.body_indices[names.index(self.joint)])
 
 
-def _jacobians(state: State, body: int) -> FloatArray:
-    """(N, n, 3) transposed Jacobians of the centre of mass of a body in the link rows, computed once per state."""
-    kept: dict[int, FloatArray] = state.__dict__.setdefault("_jacobians", {})
-    if body not in kept:
-        robot, motion = state.robot, state.motion
+def _jacobians(state: State, body: int, wanted: NDArray[np.bool_]) -> FloatArray:
+    """(N, n, 3) transposed Jacobians of the centre of mass of a body in the link rows, zero where not `wanted` (N,).
+
+    Each is computed once per state.
+    """
+    robot, motion = state.robot, state.motion
+    kept: dict[int, tuple[NDArray[np.bool_], FloatArray]] = state.__dict__.setdefault("_jacobians", {})
+    known, rows = kept.setdefault(body, (np.zeros(len(motion), dtype=bool), np.zeros((len(motion), robot.n, 3))))
+    missing = np.flatnonzero(wanted & ~known)
+    if len(missing):
         data = robot.extended_model.createData()
-        x = robot.extended_state(motion.q, motion.theta)
-        kept[body] = np.stack([robot.link_map.T @ _jacobian(robot, data, body, each) for each in x])
-    return kept[body]
+        x = robot.extended_state(motion.q[missing], motion.theta[missing])
+        for k, each in zip(missing, x, strict=True):
+            rows[k] = robot.link_map.T @ _jacobian(robot, data, body, each)
+        known[missing] = True
+    return np.where(wanted[:, None, None], rows, 0.0)
 
 
 def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray) -> FloatArray:
