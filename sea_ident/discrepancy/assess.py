@@ -14,7 +14,8 @@ from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.refit import of_every_kind, refitted
+from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect

@@ -38,6 +38,10 @@ ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
 
 
+Key = tuple[str, str | None, str]
+"""Name of an effect, its joint, and the other joint where there is one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """An effect as a direction in which the residual may go.
@@ -61,7 +65,7 @@ class Candidate:
     raw_power: FloatArray
 
     @property
-    def key(self) -> tuple[str, str | None, str]:
+    def key(self) -> Key:
         """What makes it this candidate, whatever its shape."""
         return effect_key(self.effect)
 
@@ -72,7 +76,7 @@ class Candidate:
         return 1.0 - float(np.sum(self.directions**2)) / total if total > 0.0 else 1.0
 
 
-def effect_key(effect: Effect) -> tuple[str, str | None, str]:
+def effect_key(effect: Effect) -> Key:
     """Name, joint, and the other joint where there is one."""
     return effect.name, effect.joint, str(getattr(effect, "other", "") or "")
 

@@ -21,6 +21,9 @@ MOST_LEFT_OUT = 0.6
 PROMISING = 0.3
 """Share of the excess there that a candidate must promise to explain for the search to be repeated [-]."""
 
+NEARLY_ALL = 0.9
+"""Share of the excess from which on what was found with these samples is where the search begins without them [-]."""
+
 RESOLVED = 0.5
 """Share of the misfit that the repeated search may leave of what the first left there, where it leaves any [-]."""
 
@@ -99,7 +102,9 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
     if most < PROMISING * first.excess:
         return None
-    found = search(far, bench.effects)
+    nothing = far.fit(bench.effects, before.noise, start=confirmed.start.fit.parameters)
+    right = first.excess < (1.0 - NEARLY_ALL) * nothing.excess
+    found = search(far, bench.effects, confirmed.selection if right else None)
     fit = found.final.fit
     explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
     if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):

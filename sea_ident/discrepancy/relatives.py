@@ -26,7 +26,8 @@ from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.heldout import HeldOut, tried
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.search import Selection, refitted
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Anchor, Column, Contribution, Effect, JointEffect, Side, State
 from sea_ident.effects.external_force import ExternalForce

@@ -1,6 +1,6 @@
 """Which effects are missing: forward selection with a family-wise level, exchange, backward elimination."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,8 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
-from sea_ident.discrepancy.described import from_described_springs
-from sea_ident.discrepancy.edges import with_sharp_edges
+from sea_ident.discrepancy.exchange import Outdone, Tried, exchange
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
@@ -20,17 +19,14 @@ from sea_ident.discrepancy.judge import (
     physical,
     scatter_p,
     significance,
-    slowest,
     too_short,
     torque_change,
     torque_changes,
 )
-from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.effects import Effect, Shape
+from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
-from sea_ident.effects.signal import SignalEffect
-from sea_ident.effects.spring import SpringEffect
 
 FAMILY_LEVEL = 1e-3
 """Probability of accepting anything where nothing is missing."""
@@ -83,59 +79,11 @@ LITTLE_LEFT = 0.02
 NEARLY_RIGHT = 3.0
 """... once one leaves less than this statistic over degrees of freedom."""
 
-RIGHT = 1.2
-"""Statistic over degrees of freedom up to which no other effect is tried in the place of one that was added."""
-
 HOPELESS = 100.0
 """Statistic over degrees of freedom beyond which no further effect is looked for, ..."""
 
 SLOW = 0.4
 """... where the second or a later one left more than this share of the excess: the library does not have it."""
-
-LEAST_OF_A_SIGNAL = 0.02
-"""Share of what it is to explain that a first step must promise of an effect in the chain of signals: it says little of
-one that is not small, but not nothing."""
-
-LARGE_AMOUNT = 0.1
-"""Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
-
-SMALLER = 0.1
-"""... with this part of it too [-]."""
-
-NO_BEGINNING = 3.0
-"""Times the statistic that comes of the estimate beyond which another amount is further from the truth than that."""
-
-CHALLENGERS = 3
-"""Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
-
-OUTDONE = 0.5
-"""One that explains less than this share of what the effect does is not tried in its place again [-], ..."""
-
-PROMISES_MORE = 0.1
-"""... unless it promises more of that than it did, by this share of it [-]."""
-
-
-Key = tuple[str, str | None, str]
-
-
-@dataclass(frozen=True)
-class _Outdone:
-    """An effect that was tried in the place of another and did not take it.
-
-    Attributes:
-        promised: share of what the other explains that it promised to explain [-].
-        explained: share that it did, nothing where it cannot be [-].
-    """
-
-    promised: float
-    explained: float
-
-    def again(self, promised: float) -> bool:
-        """Whether it is worth another try by what it promises now [-]."""
-        return self.explained > OUTDONE or promised > self.promised + PROMISES_MORE
-
-
-_Tried = dict[tuple[Key, Key], _Outdone]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,21 +113,25 @@ class Selection:
         return effects[len(effects) - self.added :] if self.added else ()
 
 
-def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
+def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = None) -> Selection:
     """Find the effects that a model lacks.
 
     Args:
         bench: the recording.
         effects: the model.
+        begun: what was found with other samples left out, to go on from; nothing by default.
 
     Returns:
         The model before and after, with what was added.
     """
     start = settle(bench, effects)
-    now = start
-    added: list[float] = []
+    now, added = start, list[float]()
     largest = np.zeros(len(bench.data.equations))
-    tried: _Tried = {}
+    tried: Tried = {}
+    if begun is not None and begun.added:
+        now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
+        now = exchange(bench, now, len(added), tried)
+        largest = _largest_changes(bench, now.fit, len(added))
     while True:
         candidates = scan(bench, now.fit, now.noise)
         tests = max(sum(c.tests for c in candidates), 1)
@@ -198,7 +150,7 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
             now = settle_again(bench, now.fit)
             if now.fit.statistic / now.fit.dof > 0.98 * before:
                 break
-        now = _exchange(bench, now, len(added), tried)
+        now = exchange(bench, now, len(added), tried)
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
         if lost and now.fit.excess > SLOW * last.fit.excess:
             break
@@ -210,8 +162,18 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
     return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
 
 
+def _largest_changes(bench: Bench, fit: Fit, added: int) -> FloatArray:
+    """(E,) the largest of `visible_changes` by any of the last effects of a fit, each by itself [-]."""
+    largest = np.zeros(len(bench.data.equations))
+    for position in range(len(fit.effects) - added, len(fit.effects)):
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        less = bench.predicted(others, fit.parameters)
+        largest = np.maximum(largest, torque_changes(bench, less, fit))
+    return largest
+
+
 def _next(
-    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray, tried: _Tried
+    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray, tried: Tried
 ) -> tuple[Fit, float] | None:
     """The best candidate refitted with everything free and its significance, None where none is worth it.
 
@@ -253,7 +215,7 @@ def _next(
         return None
     own, whole_gain = effect_key(best[1].effects[-1]), fit.statistic - best[1].statistic
     for candidate, gain in refits:
-        tried[own, candidate.key] = _Outdone(candidate.gain / whole_gain, gain / whole_gain)
+        tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
     return best[1], best[2]
 
 
@@ -293,114 +255,6 @@ def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
     Where the model bent to do without it, the change is larger than the effect and says nothing of its size.
     """
     return np.minimum(torque_changes(bench, before, after), 2.0 * own_torque(bench, after, -1))
-
-
-def refitted(
-    bench: Bench,
-    before: Sequence[Effect],
-    effect: Effect,
-    after: Sequence[Effect],
-    noise: NoiseFloor,
-    start: Mapping[str, float],
-    beat: float = np.inf,
-) -> Fit:
-    """A model with one effect more, its shapes refined from the best of several beginnings.
-
-    Args:
-        bench: the recording.
-        before: effects of the model that stand before it.
-        effect: the effect.
-        after: effects of the model that stand after it.
-        noise: noise floor.
-        start: parameters to start from.
-        beat: statistic that is of interest; what will stay above need not be exact.
-
-    Returns:
-        The fit.
-    """
-    begun = [effect]
-    if isinstance(effect, SignalEffect) and effect.beginnings:
-        first = effect.amounts[0].name
-        begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
-    if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
-        smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
-        begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
-    fits: list[Fit] = []
-    for each in begun:
-        model = (*before, each, *after)
-        if fits and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
-            continue
-        fits.append(bench.refine(model, noise, start=start, only=len(bench.effects), beat=beat))
-    best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
-    if isinstance(effect, SignalEffect):
-        best = from_described_springs(bench, best, len(before), noise, start)
-    if isinstance(effect, SpringEffect):
-        # the law of the spring was another one as long as the effect was missing
-        anchored = list(best.effects)
-        anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
-        if tuple(anchored) != best.effects:
-            best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects), beat=beat)
-    return with_sharp_edges(bench, best, noise, len(before))
-
-
-def _share(effect: SignalEffect, amount: Shape) -> float:
-    """Part of its range that an amount takes [-]."""
-    return abs(float(getattr(effect, amount.name))) / max(amount.upper - amount.lower, 1e-300)
-
-
-def of_every_kind(candidates: Sequence[Candidate], count: int, joint: str | None = None) -> list[Candidate]:
-    """The first candidates, the first of every side of the model that is not among them, and the signals of a joint.
-
-    A first step along a tangent flatters what has many shapes, and says little about an effect in the chain of signals
-    whose amount is not small.
-    """
-    chosen = list(candidates[:count])
-    kinds = {kind_of(c.effect) for c in chosen}
-    for candidate in candidates[count:]:
-        if kind_of(candidate.effect) not in kinds:
-            chosen.append(candidate)
-            kinds.add(kind_of(candidate.effect))
-        elif joint is not None and candidate.effect.joint == joint and is_signal(candidate.effect):
-            chosen.append(candidate)
-    return chosen
-
-
-def kind_of(effect: Effect) -> str:
-    """What an effect acts on: a side of the model, or which part of the chain of signals."""
-    return effect.name if is_signal(effect) else str(effect.side)
-
-
-def _exchange(bench: Bench, now: Settled, added: int, tried: _Tried) -> Settled:
-    """Replace effects that were added by better ones, now that the others are there and the noise floor is right."""
-    first = len(now.fit.effects) - added
-    for position in range(first, first + added):
-        fit, noise = now.fit, now.noise
-        if fit.statistic < RIGHT * fit.dof and not slowest(fit.effects[position]):
-            continue
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        reduced = bench.fit(others, noise, start=fit.parameters)
-        own, explained = effect_key(fit.effects[position]), max(reduced.statistic - fit.statistic, 1e-300)
-        best = fit
-        rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
-        for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
-            promised = candidate.gain / explained
-            last = tried.get((own, candidate.key))
-            if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
-                continue
-            if last is not None and not last.again(promised):
-                continue
-            better = best.statistic + penalty(best.effects[position], bench) - 1.0
-            beat = better - penalty(candidate.effect, bench)
-            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
-            slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
-            possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
-            gain = reduced.statistic - new.statistic if possible else 0.0
-            tried[own, candidate.key] = _Outdone(promised, gain / explained)
-            if possible and new.statistic < beat:
-                best = new
-        if best is not fit:
-            now = settle_again(bench, best)
-    return now
 
 
 def _eliminate(bench: Bench, now: Settled, added: list[float], tests: int) -> tuple[Settled, list[float]]:

@@ -8,7 +8,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import ALIKE, BARELY_SEEN, REGRESSOR_MARGIN, WIDEST_MARGIN, free_samples, spectrum
 from sea_ident.discrepancy.judge import too_short
 from sea_ident.discrepancy.noise import stacked
-from sea_ident.discrepancy.search import refitted
+from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SensorNoise

@@ -7,7 +7,8 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.decide import decide
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import tried
-from sea_ident.discrepancy.search import Selection, refitted
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 
 JOINT = "knee"

@@ -7,7 +7,8 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.described import begin_as_described
-from sea_ident.discrepancy.search import refitted, search
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.robot import load_robot

@@ -1,0 +1,79 @@
+"""Effects that were added, replaced by better ones now that the others are there."""
+
+from dataclasses import dataclass
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import Key, effect_key, scan
+from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.judge import penalty, physical, slowest, too_short
+from sea_ident.discrepancy.refit import of_every_kind, refitted
+from sea_ident.discrepancy.settle import Settled, settle_again
+
+RIGHT = 1.2
+"""Statistic over degrees of freedom up to which no other effect is tried in the place of one that was added."""
+
+LEAST_OF_A_SIGNAL = 0.02
+"""Share of what it is to explain that a first step must promise of an effect in the chain of signals: it says little of
+one that is not small, but not nothing."""
+
+CHALLENGERS = 3
+"""Candidates that are tried in the place of an effect that was added, and the best of every kind beside them."""
+
+OUTDONE = 0.5
+"""One that explains less than this share of what the effect does is not tried in its place again [-], ..."""
+
+PROMISES_MORE = 0.1
+"""... unless it promises more of that than it did, by this share of it [-]."""
+
+
+@dataclass(frozen=True)
+class Outdone:
+    """An effect that was tried in the place of another and did not take it.
+
+    Attributes:
+        promised: share of what the other explains that it promised to explain [-].
+        explained: share that it did, nothing where it cannot be [-].
+    """
+
+    promised: float
+    explained: float
+
+    def again(self, promised: float) -> bool:
+        """Whether it is worth another try by what it promises now [-]."""
+        return self.explained > OUTDONE or promised > self.promised + PROMISES_MORE
+
+
+Tried = dict[tuple[Key, Key], Outdone]
+
+
+def exchange(bench: Bench, now: Settled, added: int, tried: Tried) -> Settled:
+    """Replace effects that were added by better ones, now that the others are there and the noise floor is right."""
+    first = len(now.fit.effects) - added
+    for position in range(first, first + added):
+        fit, noise = now.fit, now.noise
+        if fit.statistic < RIGHT * fit.dof and not slowest(fit.effects[position]):
+            continue
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        reduced = bench.fit(others, noise, start=fit.parameters)
+        own, explained = effect_key(fit.effects[position]), max(reduced.statistic - fit.statistic, 1e-300)
+        best = fit
+        rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
+        for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
+            promised = candidate.gain / explained
+            last = tried.get((own, candidate.key))
+            if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
+                continue
+            if last is not None and not last.again(promised):
+                continue
+            better = best.statistic + penalty(best.effects[position], bench) - 1.0
+            beat = better - penalty(candidate.effect, bench)
+            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
+            slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
+            possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
+            gain = reduced.statistic - new.statistic if possible else 0.0
+            tried[own, candidate.key] = Outdone(promised, gain / explained)
+            if possible and new.statistic < beat:
+                best = new
+        if best is not fit:
+            now = settle_again(bench, best)
+    return now

@@ -1,0 +1,101 @@
+"""A model with another effect, fitted from several beginnings."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import Candidate
+from sea_ident.discrepancy.described import from_described_springs
+from sea_ident.discrepancy.edges import with_sharp_edges
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.effects import Effect, Shape
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring import SpringEffect
+
+LARGE_AMOUNT = 0.1
+"""Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
+
+SMALLER = 0.1
+"""... with this part of it too [-]."""
+
+NO_BEGINNING = 3.0
+"""Times the statistic that comes of the estimate beyond which another amount is further from the truth than that."""
+
+
+def refitted(
+    bench: Bench,
+    before: Sequence[Effect],
+    effect: Effect,
+    after: Sequence[Effect],
+    noise: NoiseFloor,
+    start: Mapping[str, float],
+    beat: float = np.inf,
+) -> Fit:
+    """A model with one effect more, its shapes refined from the best of several beginnings.
+
+    Args:
+        bench: the recording.
+        before: effects of the model that stand before it.
+        effect: the effect.
+        after: effects of the model that stand after it.
+        noise: noise floor.
+        start: parameters to start from.
+        beat: statistic that is of interest; what will stay above need not be exact.
+
+    Returns:
+        The fit.
+    """
+    begun = [effect]
+    if isinstance(effect, SignalEffect) and effect.beginnings:
+        first = effect.amounts[0].name
+        begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
+    if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
+        smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
+        begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
+    fits: list[Fit] = []
+    for each in begun:
+        model = (*before, each, *after)
+        if fits and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
+            continue
+        fits.append(bench.refine(model, noise, start=start, only=len(bench.effects), beat=beat))
+    best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
+    if isinstance(effect, SignalEffect):
+        best = from_described_springs(bench, best, len(before), noise, start)
+    if isinstance(effect, SpringEffect):
+        # the law of the spring was another one as long as the effect was missing
+        anchored = list(best.effects)
+        anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
+        if tuple(anchored) != best.effects:
+            best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects), beat=beat)
+    return with_sharp_edges(bench, best, noise, len(before))
+
+
+def _share(effect: SignalEffect, amount: Shape) -> float:
+    """Part of its range that an amount takes [-]."""
+    return abs(float(getattr(effect, amount.name))) / max(amount.upper - amount.lower, 1e-300)
+
+
+def of_every_kind(candidates: Sequence[Candidate], count: int, joint: str | None = None) -> list[Candidate]:
+    """The first candidates, the first of every side of the model that is not among them, and the signals of a joint.
+
+    A first step along a tangent flatters what has many shapes, and says little about an effect in the chain of signals
+    whose amount is not small.
+    """
+    chosen = list(candidates[:count])
+    kinds = {kind_of(c.effect) for c in chosen}
+    for candidate in candidates[count:]:
+        if kind_of(candidate.effect) not in kinds:
+            chosen.append(candidate)
+            kinds.add(kind_of(candidate.effect))
+        elif joint is not None and candidate.effect.joint == joint and is_signal(candidate.effect):
+            chosen.append(candidate)
+    return chosen
+
+
+def kind_of(effect: Effect) -> str:
+    """What an effect acts on: a side of the model, or which part of the chain of signals."""
+    return effect.name if is_signal(effect) else str(effect.side)
