@@ -107,10 +107,15 @@ def _jacobians(state: State, body: int, wanted: NDArray[np.bool_]) -> FloatArray
     known, rows = kept.setdefault(body, (np.zeros(len(motion), dtype=bool), np.zeros((len(motion), robot.n, 3))))
     missing = np.flatnonzero(wanted & ~known)
     if len(missing):
-        data = robot.extended_model.createData()
-        x = robot.extended_state(motion.q[missing], motion.theta[missing])
-        for k, each in zip(missing, x, strict=True):
-            rows[k] = robot.link_map.T @ _jacobian(robot, data, body, each)
+        model = robot.extended_model.copy()
+        centre = pin.SE3(np.eye(3), model.inertias[body].lever)
+        frame = model.addFrame(pin.Frame("pushed", body, 0, centre, pin.FrameType.OP_FRAME))
+        data, axes = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        full = np.empty((len(missing), 6, model.nv))
+        for k, x in enumerate(np.ascontiguousarray(robot.extended_state(motion.q[missing], motion.theta[missing]))):
+            # a robot with a single velocity gets its Jacobian as a vector
+            full[k] = pin.computeFrameJacobian(model, data, x, frame, axes).reshape(6, model.nv)
+        rows[missing] = robot.link_map.T @ full[:, :3].transpose(0, 2, 1)
         known[missing] = True
     return np.where(wanted[:, None, None], rows, 0.0)
 
