@@ -55,7 +55,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         for candidate in of_every_kind(tried, RIVALS):
             if candidate.gain < 0.3 * gain:
                 continue
-            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
+            beat = fit.statistic + EQUALLY_GOOD * unit
+            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if slowest(new.effects[position]):
                 continue
