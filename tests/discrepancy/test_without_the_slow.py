@@ -63,3 +63,26 @@ def test_more_caution_leaves_out_more_and_nothing_else(lingering):
     assert np.all(far.left_out >= lingering.left_out)
     assert far.left_out.mean() > lingering.left_out.mean()
     np.testing.assert_array_equal(far.tau_motor, lingering.tau_motor)
+
+
+def test_the_search_goes_on_from_what_explains_nearly_all(lingering, monkeypatch):
+    """A large offset is plain with the slow samples too; only the ripple is looked for without them."""
+    leg = lingering.robot
+    offset = np.array([[0.0, 4.0, 0.0]])
+    data = replace(
+        lingering, tau_motor=lingering.tau_motor + offset, period_tau_motor=lingering.period_tau_motor + offset
+    )
+    bench = Bench(data, (*base_effects(leg), *spring_effects(leg)))
+    first = search(bench, bench.effects)
+    assert ("torque_offset", "knee") in named(first)
+    begun = []
+
+    def noted(far, effects, found=None):
+        begun.append(found)
+        return search(far, effects, found)
+
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", noted)
+    second = without_the_slow(bench, confirm(bench, first))
+    assert begun == [first]
+    assert second is not None
+    assert set(named(second.selection)) == {("torque_offset", "knee"), ("torque_ripple", "hip")}

@@ -1,0 +1,67 @@
+"""An effect that was added is replaced by a better one, and what was outdone is not tried again."""
+
+import pytest
+
+import sea_ident.discrepancy.exchange as module
+from sea_ident.discrepancy.candidates import effect_key, scan
+from sea_ident.discrepancy.exchange import Outdone, exchange
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.settle import settle_again
+
+
+@pytest.fixture(scope="module")
+def wrong(rippled):
+    """A model whose hip has the friction that comes nearest to its ripple."""
+    bench, start, _ = rippled
+    found = {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
+    other = found["position_dependent_friction", "hip"]
+    new = refitted(bench, start.fit.effects, other, (), start.noise, start.fit.parameters)
+    return bench, settle_again(bench, new)
+
+
+@pytest.fixture
+def tries(monkeypatch):
+    """Effects that are fitted in the place of another."""
+    seen = []
+
+    def noted(bench, before, effect, *rest):
+        seen.append((effect.name, effect.joint))
+        return refitted(bench, before, effect, *rest)
+
+    monkeypatch.setattr(module, "refitted", noted)
+    return seen
+
+
+def key(name, joint="hip"):
+    return name, joint, ""
+
+
+def test_the_right_one_takes_the_place_of_the_wrong_one(wrong, tries):
+    bench, now = wrong
+    tried = {}
+    after = exchange(bench, now, 1, tried)
+    assert effect_key(after.fit.effects[-1]) == key("torque_ripple")
+    assert after.fit.statistic < 1.2 * after.fit.dof
+    own = effect_key(now.fit.effects[-1])
+    assert tried[own, key("torque_ripple")].explained > 1.0
+    assert ("torque_ripple", "hip") in tries
+    # every other one that was tried does less, and is not tried once more with what it promised
+    tries.clear()
+    exchange(bench, now, 1, {**tried, (own, key("torque_ripple")): Outdone(9.0, 0.0)})
+    outdone = {pair[1][:2] for pair, how in tried.items() if how.explained < module.OUTDONE}
+    assert outdone
+    assert not outdone & set(tries)
+
+
+def test_what_promises_more_than_it_did_is_tried_again(wrong, tries):
+    bench, now = wrong
+    own = effect_key(now.fit.effects[-1])
+    after = exchange(bench, now, 1, {(own, key("torque_ripple")): Outdone(promised=0.1, explained=0.0)})
+    assert ("torque_ripple", "hip") in tries
+    assert effect_key(after.fit.effects[-1]) == key("torque_ripple")
+
+
+def test_a_model_that_is_right_is_left_alone(rippled, tries):
+    bench, _, right = rippled
+    assert exchange(bench, right, 1, {}) is right
+    assert tries == []

@@ -1,0 +1,39 @@
+"""Parameters of a model fitted with its shapes held."""
+
+import numpy as np
+import pytest
+
+
+def test_columns_are_the_derivative_of_the_whitened_residual(rippled):
+    """That of a link too, whose scale follows the stiffness that is fitted."""
+    bench, _, now = rippled
+    fit, flat = now.fit, bench.whitening(now.noise).flat
+    for name in ("hip.spring_stiffness", "knee.spring_stiffness", "knee.coulomb_friction", "foot.mass"):
+        column = next((k for k, c in enumerate(fit.columns) if c.name == name), None)
+        if column is None:
+            continue
+        step = 1e-4 * abs(fit.values[column])
+        ends = []
+        for sign in (-1.0, 1.0):
+            there = bench.predicted(fit.effects, {**fit.parameters, name: fit.values[column] + sign * step})
+            ends.append(flat(there.residual * there.scale))
+        slope = (ends[0] - ends[1]) / (2.0 * step)
+        np.testing.assert_allclose(slope, fit.flat[:, column], atol=1e-5 * np.abs(slope).max())
+
+
+def test_a_fit_stands_where_no_parameter_brings_the_statistic_down(rippled):
+    fit = rippled[2].fit
+    columns = fit.flat[:, : len(fit.columns)]
+    lengths = np.linalg.norm(columns, axis=0)
+    slope = columns.T @ fit.whitened / np.where(lengths > 0.0, lengths, 1.0)
+    # a standard deviation is one
+    assert np.abs(slope).max() < 0.05
+
+
+def test_a_planted_effect_is_fitted_within_its_own_standard_errors(rippled):
+    fit = rippled[2].fit
+    found = [k for k, c in enumerate(fit.columns) if "torque_ripple" in c.name]
+    assert len(found) == 2
+    for k, planted in zip(found, (1.0, 0.5), strict=True):
+        assert fit.values[k] == pytest.approx(planted, abs=4.0 * fit.std(k))
+        assert fit.std(k) < 0.05

@@ -1,0 +1,63 @@
+"""A model with another effect: what cannot win is given up, what can is not."""
+
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.effects import make_effect
+
+
+@pytest.fixture
+def steps(monkeypatch):
+    """Steps of shapes that are taken."""
+    taken = []
+    step = Bench._refine_step
+
+    def counted(self, fit, noise, only):
+        taken.append(fit.statistic)
+        return step(self, fit, noise, only)
+
+    monkeypatch.setattr(Bench, "_refine_step", counted)
+    return taken
+
+
+@pytest.fixture(scope="module")
+def candidates(rippled):
+    bench, start, _ = rippled
+    return {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
+
+
+def test_what_is_far_above_and_comes_down_slowly_is_given_up(rippled, candidates, steps):
+    bench, start, right = rippled
+    wrong = candidates["link_friction", "ankle"]
+    args = (bench, start.fit.effects, wrong, (), start.noise, start.fit.parameters)
+    whole = refitted(*args)
+    count = len(steps)
+    steps.clear()
+    given_up = refitted(*args, right.fit.statistic)
+    assert len(steps) < count
+    # but not so early that it could have been the better one
+    assert whole.statistic > 3.0 * right.fit.statistic
+    assert given_up.statistic < start.fit.statistic
+
+
+def test_what_is_better_is_refined_to_the_end(rippled, candidates, steps):
+    bench, start, _ = rippled
+    ripple = candidates["torque_ripple", "hip"]
+    args = (bench, start.fit.effects, ripple, (), start.noise, start.fit.parameters)
+    whole = refitted(*args)
+    asked = list(steps)
+    steps.clear()
+    assert refitted(*args, 1.01 * whole.statistic).statistic == pytest.approx(whole.statistic, rel=1e-9)
+    assert steps == pytest.approx(asked)
+    assert whole.effects[-1].order == pytest.approx(4.0, abs=0.02)
+
+
+def test_beginnings_that_are_worse_than_the_estimate_are_not_followed(rippled, steps):
+    """An offset of a right encoder: from the far ends of its range there is nothing to be learned."""
+    bench, _, right = rippled
+    offset = make_effect("encoder_offset", "knee")
+    assert len(offset.beginnings) == 2
+    refitted(bench, right.fit.effects, offset, (), right.noise, right.fit.parameters)
+    assert max(steps) < 3.0 * right.fit.statistic
