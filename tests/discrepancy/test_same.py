@@ -1,9 +1,11 @@
 """A held-out recording that is the recording itself is refused, however it was written; another one is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.same import not_the_same
+from sea_ident.discrepancy.same import not_the_same, same_motion
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording
 
@@ -72,3 +74,35 @@ def test_without_noise_a_motion_of_other_friction_is_no_copy():
 def test_less_than_half_in_common_is_another_recording():
     whole = recording(1, samples=5000)
     not_the_same(changed(whole, lambda x: x[:3000]), changed(whole, lambda x: x[2000:]))
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        (lambda theta: theta, True),
+        (lambda theta: np.roll(theta, 200, axis=0), True),
+        (lambda theta: theta + 0.05 * (theta - theta.mean(axis=0)), True),
+        (lambda theta: theta[::2], True),  # by half the rate
+        (lambda theta: theta * [1.0, 1.5, 1.0], False),  # one joint is enough
+        (lambda theta: theta * [1.0, 1.0, -1.0], False),
+        (lambda theta: theta + np.array([0.5, 0.0, 0.0]), False),  # gravity acts otherwise there
+        (lambda theta: theta[::-1], False),
+        (lambda theta: np.stack([theta[:, 0], np.roll(theta[:, 1], 200), theta[:, 2]], axis=1), False),
+    ],
+)
+def test_a_motion_is_the_same_wherever_it_begins_and_another_where_one_joint_moves_otherwise(
+    nothing_missing, change, same
+):
+    data = nothing_missing[0].data
+    theta = change(data.motion.theta)
+    motion = replace(data.motion, **{
+        kind: theta if kind == "theta" else np.zeros_like(theta)
+        for kind in ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
+    }, time=data.motion.time[: len(theta)])  # fmt: skip
+    assert same_motion(data, replace(data, motion=motion)) is same
+
+
+def test_the_same_path_in_another_time_is_another_motion(nothing_missing):
+    data = nothing_missing[0].data
+    assert same_motion(data, replace(data, period=1.005 * data.period))
+    assert not same_motion(data, replace(data, period=1.1 * data.period))
