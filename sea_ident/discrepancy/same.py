@@ -89,8 +89,7 @@ def _equal_samples(first: FloatArray, second: FloatArray) -> int:
 
 def _copied_samples(first: FloatArray, second: FloatArray) -> int:
     """How many samples differ by less than the noise, side by side at the lag at which the noise is most alike."""
-    finite = np.all(np.isfinite(first), axis=0) & np.all(np.isfinite(second), axis=0)
-    moving = finite & (np.ptp(first, axis=0) > 0.0) & (np.ptp(second, axis=0) > 0.0)
+    moving = (np.ptp(first, axis=0) > 0.0) & (np.ptp(second, axis=0) > 0.0)
     first, second = first[:, moving], second[:, moving]
     if min(len(first), len(second)) < FEWEST or not first.shape[1]:
         return 0
