@@ -196,6 +196,15 @@ def test_the_same_samples_under_another_name_are_refused(model, intact):
         sea_ident.diagnose(model, intact, holdout=type(intact)(intact.time[half], part, "half of it"))
 
 
+@pytest.mark.parametrize("column", ["q_ankle", "current_knee"])
+def test_a_dead_channel_is_refused_in_either_recording(model, intact, column):
+    dead = changed(intact, **{column: np.full(len(intact.time), 0.5)})
+    with pytest.raises(DiagnosisError, match=f"column {column} is constant"):
+        sea_ident.diagnose(model, dead)
+    with pytest.raises(DiagnosisError, match=f"column {column} is constant"):
+        sea_ident.diagnose(model, intact, holdout=dead)
+
+
 def test_the_order_of_the_columns_does_not_matter(model, intact):
     turned = type(intact)(intact.time, dict(reversed(intact.columns.items())), "turned")
     assert quietly(model, turned, period=PERIOD).verdict is Verdict.NONE
