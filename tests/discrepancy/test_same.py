@@ -65,7 +65,7 @@ def test_more_than_half_in_common_is_a_copy():
 
 @pytest.mark.parametrize(
     ("name", "values"),
-    [("q_grip", np.full(SAMPLES, 0.25)), ("q_reference_hip", np.sin(0.01 * np.arange(SAMPLES)))],
+    [("q_grip", np.full(SAMPLES, 0.25)), ("q_reference_hip", np.linspace(0.0, 1.0, SAMPLES))],
     ids=["a joint that stands still", "a reference, which has no noise"],
 )
 def test_what_has_no_noise_hides_no_copy(name, values):
