@@ -1,7 +1,6 @@
 """What `sea-ident diagnose` writes beside the diagnosis."""
 
 import sys
-from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -16,11 +15,11 @@ from sea_ident.robot import load_robot
 def told(monkeypatch, tmp_path):
     """Runs the verb with a diagnosis that is given."""
 
-    def run(diagnosis):
+    def run(diagnosis, *more):
         monkeypatch.setattr("sea_ident.estimation.read_model", lambda path: SimpleNamespace())
         monkeypatch.setattr("sea_ident.recordings.read_recording", lambda path, columns=None: SimpleNamespace())
         monkeypatch.setattr("sea_ident.discrepancy.diagnose", lambda *args, **options: diagnosis)
-        words = ["diagnose", "model.json", "rec.csv", "--out", "d.json", "--next", "next.json"]
+        words = ["diagnose", "model.json", "rec.csv", "--out", "d.json", "--next", "next.json", *more]
         monkeypatch.setattr(sys, "argv", ["sea-ident", *words])
         monkeypatch.chdir(tmp_path)
         with pytest.raises(SystemExit) as done:
@@ -43,8 +42,28 @@ def test_the_next_experiment_is_an_excitation_like_any_other(told, tmp_path, cap
     assert list(tmp_path.glob("*.part*")) == []
 
 
-def test_without_a_next_experiment_none_is_written_and_that_is_said(told, tmp_path, capsys):
-    found = Diagnosis(Verdict.NAMED, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {}))
-    told(replace(found, next_experiment=None))
+@pytest.mark.parametrize(
+    ("verdict", "reason"),
+    [
+        (Verdict.NAMED, "it is for an ambiguous pair, and the verdict is named"),
+        (Verdict.NONE, "it is for an ambiguous pair, and the verdict is none"),
+        (Verdict.AMBIGUOUS, "no motion was found that tells the effects apart better"),
+    ],
+)
+def test_without_a_next_experiment_none_is_written_and_that_is_said(told, tmp_path, capsys, verdict, reason):
+    told(Diagnosis(verdict, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {})))
     assert not (tmp_path / "next.json").exists()
-    assert "next.json is not written: the verdict named comes without" in capsys.readouterr().err
+    out, err = capsys.readouterr()
+    assert f"warning: next.json is not written: {reason}" in err
+    assert "older" not in err
+    assert out.endswith("written: d.json\n")
+
+
+def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path, capsys):
+    """Else what an earlier diagnosis proposed passes for what this one does."""
+    (tmp_path / "next.json").write_text("before")
+    told(Diagnosis(Verdict.NAMED, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {})), "--model-out", "m.json")
+    assert (tmp_path / "next.json").read_text() == "before"
+    older, model = (line for line in capsys.readouterr().err.splitlines()[::-1])
+    assert older.endswith("; the file of that name is an older one")
+    assert model == "warning: m.json is not written: the verdict named comes without a repaired model"

@@ -34,10 +34,15 @@ def scored(root: Path, planted: tuple[Planted, ...], diagnosis: dict, row: str =
     return score
 
 
-def said(*names: tuple[str, str], verdict: str = "named", alternatives: tuple[tuple[str, str], ...] = ()) -> dict:
+def said(
+    *names: tuple[str, str],
+    verdict: str = "named",
+    alternatives: tuple[tuple[str, str], ...] = (),
+    seconds: float = 1.0,
+) -> dict:
     other = [{"effect": effect, "joint": joint, "cos2": 0.9} for effect, joint in alternatives]
     missing = [{"effect": e, "joint": j, "torque_share": 0.02, "alternatives": other} for e, j in names]
-    return {"verdict": verdict, "missing": missing, "seconds": 1.0}
+    return {"verdict": verdict, "missing": missing, "seconds": seconds}
 
 
 def test_right_name_at_right_joint(tmp_path: Path) -> None:
@@ -85,6 +90,27 @@ def test_table_counts_and_marks_goals(tmp_path: Path) -> None:
     assert "3/4 = 75.0 %" in text
     assert (tmp_path / "confusion.png").stat().st_size > 1000
     assert "torque_ripple @ hip" in (tmp_path / "misses.txt").read_text()
+
+
+def test_the_table_tells_how_long_diagnoses_take(tmp_path: Path) -> None:
+    """Ten of 1 to 10 s and one of 30 s: by its median alone a goal is met that some diagnoses miss by far."""
+    told = [*(float(k) for k in range(1, 11)), 30.0]
+    scores = [scored(tmp_path, (RIPPLE,), said(("torque_ripple", "knee"), seconds=s), index=k)
+              for k, s in enumerate(told)]  # fmt: skip
+    failed = scored(tmp_path, (RIPPLE,), {"error": "broken"}, index=20)  # has no seconds
+    other = replace(scores[0], case=replace(scores[0].case, robot="baxter"), seconds=50.0)
+    lines = {line.what.removeprefix("seconds of a diagnosis, "): line for line in lines_of([*scores, failed, other])}
+    figures = {what: (lines[f"exo_leg, {what}"].value, lines[f"exo_leg, {what}"].met) for what in (
+        "median", "90th percentile", "largest")}  # fmt: skip
+    assert figures == {"median": (6.0, True), "90th percentile": (10.0, True), "largest": (30.0, False)}
+    over = lines["exo_leg, more than 10"]
+    assert (over.successes, over.trials, over.met) == (1, 11, False)
+    assert (lines["baxter, largest"].value, lines["baxter, largest"].met) == (50.0, True)
+    assert lines["baxter, more than 60"].met
+    assert not any(what.startswith("ur5") for what in lines)
+    text = write_report(tmp_path)
+    assert "seconds of a diagnosis, exo_leg, 90th percentile" in text
+    assert "1/11 = 9.1 %" in text
 
 
 def test_the_folder_of_a_case_holds_nothing_of_the_truth(tmp_path: Path) -> None:

@@ -118,7 +118,7 @@ def conclude(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
-        other_motion=held is not None and held.other_motion, nameless=nameless, sound=not notes.fatal,
+        kind=None if held is None else held.kind, nameless=nameless, sound=not notes.fatal,
     )  # fmt: skip
     found = Diagnosis(
         verdict=verdict,
@@ -131,7 +131,7 @@ def conclude(
         training=gap,
         holdout=held_gap,
         detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates),
-        warnings=tuple(dict.fromkeys((*notes.warnings, *trends.notes, *words.reservations(facts, held is not None)))),
+        warnings=tuple(dict.fromkeys((*notes.warnings, *trends.notes, *words.reservations(facts)))),
         waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
         recording=bench.data.source,
         holdout_source=None if held is None else held.source,

@@ -10,7 +10,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
-from sea_ident.discrepancy.heldout import HeldOut, tried
+from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
@@ -114,12 +114,12 @@ def decide(
                 # it was fitted beside an effect that is out by now
                 fit = _beside(bench, selection, position, fit)
             replaced = replace(selection, final=Settled(fit, selection.final.noise))
-            there = tried(held.bench, replaced, held.source)
+            there = held.again(replaced)
             rival = there.transfers[position - first]
             if _better(rival, own):
                 before = selection.final.fit
                 selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
-                held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
+                held = there
                 # what was no better than the one that is now out was no better than this one
                 left = []
                 out = before.effects[position]
@@ -157,7 +157,7 @@ def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, posi
     for other, result, there in _open_shapes(bench, selection, held, position, fit, best):
         if _better(result, best):
             best, selection = result, replace(selection, final=Settled(other, selection.final.noise))
-            held = replace(there, processed=held.processed, recording=held.recording, warnings=held.warnings)
+            held = there
     return selection, held
 
 
@@ -193,7 +193,7 @@ def _open_shapes(
             other = bench.fit(effects, noise, start=base.parameters)
             if other.statistic - base.statistic > enough or not physical(bench, other, position):
                 break
-            there = tried(held.bench, replace(selection, final=Settled(other, noise)), held.source)
+            there = held.again(replace(selection, final=Settled(other, noise)))
             result = there.transfers[position - len(effects) + selection.added]
             yield other, result, there
             if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:

@@ -19,7 +19,7 @@ from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
-from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
+from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.relatives import unnamed
@@ -209,10 +209,7 @@ def _tested(
     weak = [k for k, found in enumerate(held.transfers) if not found.holds]
     if 0 < len(weak) < confirmed.selection.added + len(trends.trends):
         selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
-        held = replace(
-            tried(held.bench, selection, held.source),
-            processed=held.processed, recording=held.recording, warnings=held.warnings,
-        )  # fmt: skip
+        held = held.again(selection)
         selection, alternatives, held = decide(bench, selection, alternatives, held)
         confirmed = confirmed.less(selection)
     return confirmed, alternatives, held, notes

@@ -1,7 +1,8 @@
-"""Data that were not used in the fit: another motion, or where none was given, every other period."""
+"""Data that were not used in the fit: another recording, or where none was given, every other period."""
 
 import warnings as python_warnings
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -11,17 +12,23 @@ from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_d
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of, torque_by_joint
 from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 
-ALIKE = 0.1
-"""Part of the motion of a motor by which its periods may differ [-]."""
-
 FEWEST_TO_SPLIT = 6
 """Periods from which on half of them are held out where no other motion is given."""
+
+
+class Kind(StrEnum):
+    """What data are held out, in words."""
+
+    OTHER_MOTION = "the motion that was held out"
+    SAME_MOTION = "the recording that was held out"
+    OTHER_PERIODS = "periods that were held out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +42,9 @@ class HeldOut:
         noise: noise floor there.
         transfers: one per effect that was added.
         source: what the data are.
-        processed: the other motion; None where other periods of the same motion were held out.
-        recording: as it was given; None where other periods of the same motion were held out.
-        warnings: what a user should know of these data.
+        processed: the other recording; None where other periods of the same one were held out.
+        recording: as it was given; None where other periods of the same one were held out.
+        kind: another motion, the same one recorded again, or other periods.
     """
 
     bench: Bench
@@ -48,12 +55,17 @@ class HeldOut:
     source: str
     processed: ProcessedRecording | None = None
     recording: Recording | ProcessedRecording | None = None
-    warnings: tuple[str, ...] = ()
+    kind: Kind = Kind.OTHER_PERIODS
 
     @property
     def other_motion(self) -> bool:
-        """Whether it is another motion, not only other periods."""
-        return self.processed is not None
+        """Whether it is another motion, not the same one again."""
+        return self.kind is Kind.OTHER_MOTION
+
+    def again(self, selection: Selection) -> "HeldOut":
+        """The same data with another selection."""
+        found = tried(self.bench, selection, self.source)
+        return replace(found, processed=self.processed, recording=self.recording, kind=self.kind)
 
 
 def held_out(
@@ -64,7 +76,7 @@ def held_out(
     Args:
         bench: the recording that was used.
         selection: what was found on it.
-        holdout: another motion; every other period of the same one where None.
+        holdout: another recording; every other period of the same one where None.
 
     Returns:
         The outcome, None where there is nothing to try it on, and warnings.
@@ -97,7 +109,8 @@ def held_out(
         warnings.extend(f"held-out data: {text}" for text in lost.warnings)
         warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")
         return other_periods(bench, selection), tuple(warnings)
-    return replace(found, processed=processed, recording=holdout), tuple(warnings)
+    kind = Kind.SAME_MOTION if same_motion(bench.data, data) else Kind.OTHER_MOTION
+    return replace(found, processed=processed, recording=holdout, kind=kind), tuple(warnings)
 
 
 def _repeats(processed: ProcessedRecording) -> bool:
@@ -107,7 +120,7 @@ def _repeats(processed: ProcessedRecording) -> bool:
         return False
     theta = np.stack([motion.theta for motion in motions])
     range_of, apart = np.std(np.mean(theta, axis=0), axis=0), np.std(theta - np.mean(theta, axis=0), axis=(0, 1))
-    return bool(np.all(apart < ALIKE * range_of))
+    return bool(np.all(apart < RUNS_DIFFER * range_of))
 
 
 def other_periods(bench: Bench, selection: Selection) -> HeldOut | None:

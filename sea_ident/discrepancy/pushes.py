@@ -36,7 +36,7 @@ beyond [s]: what is shorter counts only beside pushes that are clear."""
 SLOW = 0.02
 """Share of the rms speed of a joint below which it hardly moves."""
 
-CHANCE = 1e-3
+DEPARTURE_LEVEL = 1e-3
 """Probability below which the strongest departure at a joint is none of the usual ones, with tails as heavy as
 exponential ones."""
 
@@ -131,7 +131,7 @@ def _slow(values: FloatArray, usable: NDArray[np.bool_], around: int) -> FloatAr
     return np.asarray(slow, dtype=np.float64)
 
 
-def chance(z: float, samples: int) -> float:
+def departure_p(z: float, samples: int) -> float:
     """Probability of such a departure in so many samples if its tails are as heavy as exponential ones."""
     return float(min(1.0, samples * np.exp(-z * np.log(2.0) / 0.6745)))
 
@@ -184,7 +184,7 @@ def _runs(
         span = slice(begin, end + 1)
         z = float(abs(smooth[peak]) / spread)
         moving = length - interval * np.count_nonzero(slow[span])
-        if chance(z, len(time)) < CHANCE:
+        if departure_p(z, len(time)) < DEPARTURE_LEVEL:
             clear = bool(clear or not reversing[peak] or moving >= CLEAR_AT_REVERSAL)
         found.append(
             Push(

@@ -23,7 +23,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
-from sea_ident.discrepancy.heldout import HeldOut, tried
+from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.refit import refitted
@@ -186,7 +186,7 @@ def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int
     if held is None or not held.other_motion:
         return True
     replaced = replace(selection, final=replace(selection.final, fit=relative.fit))
-    rival, own = tried(held.bench, replaced, held.source).transfers[k], held.transfers[k]
+    rival, own = held.again(replaced).transfers[k], held.transfers[k]
     return rival.holds and rival.statistic < own.statistic
 
 

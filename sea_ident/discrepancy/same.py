@@ -1,8 +1,10 @@
-"""Whether a held-out recording is the recording itself, in whole or in part, under another name or start."""
+"""Whether a held-out recording is the recording itself, under another name or start, or the same motion again."""
 
 import numpy as np
+from scipy.signal import resample
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.data import PeriodData
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.variance import noise_from_curvature
@@ -16,6 +18,25 @@ NOISE = 0.3
 
 FEWEST = 64
 """Samples that two recordings must have in common to be compared one beside the other."""
+
+RUNS_DIFFER = 0.1
+"""Part of the motion of a motor by which two runs of one motion may differ [-]."""
+
+SAME_PERIOD = 0.01
+"""Part of a period by which those of two runs of one motion may differ [-]."""
+
+
+def same_motion(recording: PeriodData, holdout: PeriodData) -> bool:
+    """Whether the periods of two recordings are those of one motion, wherever in it they begin."""
+    if abs(holdout.period - recording.period) > SAME_PERIOD * recording.period:
+        return False
+    samples = max(recording.samples, holdout.samples)
+    first, second = (resample(data.motion.theta, samples) for data in (recording, holdout))
+    ranges = np.maximum(np.std(first, axis=0), 1e-300)
+    one, other = (np.fft.rfft((theta - theta.mean(axis=0)) / ranges, axis=0) for theta in (first, second))
+    alike = np.fft.irfft(one * np.conj(other), samples, axis=0)
+    apart = np.sqrt(np.mean((first - np.roll(second, int(np.argmax(alike.sum(axis=1))), axis=0)) ** 2, axis=0))
+    return bool(np.all(apart < RUNS_DIFFER * ranges))
 
 
 def not_the_same(recording: Recording | ProcessedRecording, holdout: Recording | ProcessedRecording) -> None:
@@ -68,8 +89,7 @@ def _equal_samples(first: FloatArray, second: FloatArray) -> int:
 
 def _copied_samples(first: FloatArray, second: FloatArray) -> int:
     """How many samples differ by less than the noise, side by side at the lag at which the noise is most alike."""
-    finite = np.all(np.isfinite(first), axis=0) & np.all(np.isfinite(second), axis=0)
-    moving = finite & (np.ptp(first, axis=0) > 0.0) & (np.ptp(second, axis=0) > 0.0)
+    moving = (np.ptp(first, axis=0) > 0.0) & (np.ptp(second, axis=0) > 0.0)
     first, second = first[:, moving], second[:, moving]
     if min(len(first), len(second)) < FEWEST or not first.shape[1]:
         return 0

@@ -30,7 +30,7 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
-from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, chance, find_pushes, pushed
+from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import FAMILY_LEVEL
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -295,7 +295,7 @@ def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[P
                     ),
                 ),
                 torque_share=float(abs(strongest.force) / max(rms[i], 1e-300)),
-                p_value=chance(strongest.z, processed.samples),
+                p_value=departure_p(strongest.z, processed.samples),
                 alternatives=(),
                 detail=make_effect("external_force", joint, start=strongest.start, stop=strongest.stop),
             )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.trend import TrendTest
@@ -30,7 +31,7 @@ class Facts:
         trend: comparison of periods.
         change: against a reference.
         units: unit of the torque of each joint.
-        other_motion: whether the held-out data are another motion, not only other periods of the same.
+        kind: what data were held out, None where none were.
         nameless: what explains the recording better in the place of an effect that was found, and has no name.
         sound: whether the recording allows a conclusion; warnings say why where it does not.
     """
@@ -45,7 +46,7 @@ class Facts:
     trend: TrendTest
     change: ParameterChange | None
     units: Mapping[str, str]
-    other_motion: bool = True
+    kind: Kind | None = None
     nameless: tuple[Unnamed, ...] = ()
     sound: bool = True
 
@@ -98,8 +99,8 @@ def _held_sentence(facts: Facts) -> str:
     held = facts.held
     if held is None:
         return ""
-    where = "On the motion that was held out" if facts.other_motion else "On periods that were held out"
-    weaker = "" if facts.other_motion else " (the same motion again, which is a weaker test)"
+    where = f"On {facts.kind}"
+    weaker = "" if facts.kind is Kind.OTHER_MOTION else " (the same motion again, which is a weaker test)"
     if not any(value > 0.0 for value in held.before.values()):
         return f"{where}{weaker} the model was within the noise before already."
     if held.shrink < 0.0:
@@ -107,7 +108,7 @@ def _held_sentence(facts: Facts) -> str:
     return f"{where}{weaker} the gap shrinks by {100 * held.shrink:.0f} %."
 
 
-def reservations(facts: Facts, held_out: bool) -> list[str]:
+def reservations(facts: Facts) -> list[str]:
     """What to know before trusting the diagnosis."""
     found = []
     if facts.periods < FEW_PERIODS:
@@ -115,12 +116,17 @@ def reservations(facts: Facts, held_out: bool) -> list[str]:
             f"{facts.periods} periods only: the noise floor is uncertain and small effects are not told from it; "
             f"record {FEW_PERIODS} or more"
         )
-    if facts.missing and held_out and not facts.other_motion:
+    if facts.missing and facts.kind is Kind.SAME_MOTION:
+        found.append(
+            "the held-out recording repeats the motion of this one, which is weaker than another motion, as a wrong "
+            "name repeats itself with the motion. Record another motion"
+        )
+    elif facts.missing and facts.kind is Kind.OTHER_PERIODS:
         found.append(
             "no held-out motion was given: every other period of this one was held out, which is weaker, as a wrong "
             "name repeats itself in every period. Record another motion"
         )
-    elif facts.missing and not held_out:
+    elif facts.missing and facts.kind is None:
         found.append("no held-out motion was given: what is named was not tested on another motion")
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")

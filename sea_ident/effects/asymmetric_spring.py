@@ -38,7 +38,7 @@ class AsymmetricSpring(SpringEffect):
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
         torque, position = self.units_of(robot)
-        unit = f"{torque}/{position}^{self.exponent:.3g}"
+        unit = f"{torque}/{position}" + ("" if self.exponent == 1.0 else f"{self.exponent:.3g}")
         return (Column(self.parameter_name(), unit, self.name, self.joint, self.side),)
 
     def variants(self, state: State) -> tuple["AsymmetricSpring", ...]:

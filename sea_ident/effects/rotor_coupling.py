@@ -12,6 +12,9 @@ from sea_ident.effects.base import Column, Contribution, Effect, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 
+ROUNDING = 1e-9
+"""Share of the torque that turns a rotor by itself below which its coupling comes from the digits of a description."""
+
 
 @dataclass(frozen=True)
 class RotorCoupling(Effect):
@@ -46,7 +49,11 @@ class RotorCoupling(Effect):
         rows = state.rotor_rows
         motor, link = rows.motor[:, :, k : k + 1].copy(), rows.link[:, :, k : k + 1]
         spin = robot.motor_map[robot.extended_model.joints[int(robot.rotor_indices[k])].idx_v, i]
-        motor[:, i, 0] -= spin**2 * state.motion.ddtheta[:, i]
+        own = spin**2 * state.motion.ddtheta[:, i]
+        motor[:, i, 0] -= own
+        # no joint before it turns a link about the axis of this rotor: all that is left is rounding
+        if max(np.abs(link).max(initial=0.0), np.abs(motor).max(initial=0.0)) < ROUNDING * np.abs(own).max(initial=0.0):
+            return Contribution(np.zeros_like(link), np.zeros_like(motor))
         return Contribution(link, motor)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:

@@ -22,12 +22,31 @@ def test_noise_beyond_the_torque_lets_nothing_be_told():
         assert "the noise of grip" in found.warnings[1]
 
 
-@pytest.mark.parametrize("column", ["q_hip", "theta_knee", "tau_motor_ankle"])
-def test_a_joint_that_does_not_move_or_has_no_torque_is_refused(column):
+@pytest.mark.parametrize(
+    ("column", "why"),
+    [
+        ("q_hip", "the sensor is dead, or the joint does not move"),
+        ("theta_knee", "the sensor is dead, or the joint does not move"),
+        ("tau_motor_ankle", "no torque is measured"),
+    ],
+)
+def test_a_joint_that_does_not_move_or_has_no_torque_is_refused(column, why):
     leg, time = load_robot("exo_leg"), 0.01 * np.arange(200)
     columns = {f"{kind}_{name}": np.sin(time) for kind in ("q", "theta", "tau_motor") for name in leg.joint_names}
     columns |= {"current_ankle": np.zeros(200)}
     channels_move(leg, Recording(time=time, columns=columns, source="a.csv"))
     dead = Recording(time=time, columns={**columns, column: np.full(200, 0.25)}, source="a.csv")
-    with pytest.raises(DiagnosisError, match=rf"a.csv: column {column} is constant, 0.25: .*--joints"):
+    with pytest.raises(DiagnosisError, match=rf"a.csv: column {column} is constant, 0.25: {why}, .*--joints"):
         channels_move(leg, dead)
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_only_what_is_used_has_to_move():
+    """A current where no torque was measured; no motor's encoder at a joint without a spring."""
+    slide, time = load_robot("emps"), 0.01 * np.arange(200)
+    (name,) = slide.joint_names
+    columns = {f"q_{name}": np.sin(time), f"theta_{name}": np.zeros(200), f"current_{name}": np.cos(time)}
+    channels_move(slide, Recording(time=time, columns=columns, source="a.csv"))
+    columns[f"current_{name}"] = np.zeros(200)
+    with pytest.raises(DiagnosisError, match=f"column current_{name} is constant, 0: no torque is measured"):
+        channels_move(slide, Recording(time=time, columns=columns, source="a.csv"))

@@ -1,15 +1,20 @@
 """Two effects that one motion does not tell apart: another motion chooses, whichever was named first."""
 
+from dataclasses import replace
+
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.decide import decide
+from sea_ident.discrepancy.diagnose import _tested
 from sea_ident.discrepancy.findings import Alternative
-from sea_ident.discrepancy.heldout import tried
+from sea_ident.discrepancy.heldout import Kind, tried
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.trend import TrendTest
 
 JOINT = "knee"
 
@@ -54,6 +59,23 @@ def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
 def test_what_takes_more_parameters_is_taken_where_the_other_motion_asks_for_it_only(rivals):
     assert decided(rivals, "spring_hysteresis", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
     assert decided(rivals, "spring_offset", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
+
+
+def test_the_same_motion_again_decides_between_no_equals(rivals, laboratory, monkeypatch):
+    """What one motion does not tell apart its repetition does not either, but by noise."""
+    bench, _, start, fits = rivals
+    position, planted = len(start.fit.effects), [("spring_offset", JOINT, [0.5], {})]
+    selection = Selection(start, Settled(fits["spring_hysteresis"], start.noise), 1, (1e-9,))
+    other = Alternative("spring_offset", JOINT, 1.0, fits["spring_offset"])
+    monkeypatch.setitem(_tested.__globals__, "decide", lambda *_: pytest.fail("decided by the same motion"))
+    confirmed = Confirmed(selection, bench, start, selection.final)
+    again = laboratory.record(planted, periods=6, seed=9)
+    listed = {position: (other, replace(other, dearer=True))}
+    now, left, held, _ = _tested(bench, confirmed, listed, TrendTest(1.0, (), False), again)
+    assert now is confirmed
+    # what does as well by more parameters only is no alternative where no other motion asks for it
+    assert left == {position: (other,)}
+    assert held.kind is Kind.SAME_MOTION
 
 
 def test_what_holds_there_as_well_stays_possible(rivals):

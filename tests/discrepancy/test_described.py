@@ -4,8 +4,11 @@ import re
 
 import pytest
 
+from sea_ident.discrepancy.assess import rivals
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.conclude import _shape_parameters
 from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.decide import simplest_first
 from sea_ident.discrepancy.described import begin_as_described
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import search
@@ -56,6 +59,33 @@ def test_a_large_error_of_an_encoder_is_found(laboratory, effect, joint):
     for name, value in LARGE[effect].items():
         assert getattr(found.effects[0], name) == pytest.approx(value, rel=0.01)
     assert found.final.fit.statistic < 1.2 * found.final.fit.dof
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("motion", [0, 1])
+@pytest.mark.parametrize("joint", ["hip", "knee", "ankle"])
+@pytest.mark.parametrize(
+    ("effect", "shape"),
+    [*LARGE.items(), ("position_delay", {"delay": 0.005})],
+    ids=["eccentricity", "offset", "delay", "short delay"],
+)
+def test_large_errors_of_encoders_are_found_at_every_joint(laboratory, effect, shape, joint, motion):
+    """Alone, of all that is as good the simplest, with its value: a wrong zero of the last encoder is as good as a
+    spring with hysteresis that never turns back."""
+    recording = laboratory.record([(effect, joint, [], shape)], periods=6, motion=motion)
+    bench = laboratory.bench(recording)
+    searched = search(bench, bench.effects)
+    found, _ = simplest_first(bench, searched, rivals(bench, searched))
+    assert [(e.name, e.joint) for e in found.effects] == [(effect, joint)]
+    fit = found.final.fit
+    values = {p.name: p for p in _shape_parameters(bench, fit, len(fit.effects) - 1)}
+    assert len(values) == len(shape)
+    for name, value in shape.items():
+        own = values[f"{joint}.{effect}_{name}"]
+        # friction near reversals differs from pass to pass and has another mean in six of them: at the hip, which
+        # carries most, values of other seeds scatter by 2.7 times what is stated (1.6 where friction repeats itself)
+        assert abs(own.value - value) < max(4.0 * own.std, 0.005 * value)
+        assert own.std < 0.01 * value
 
 
 def test_the_wrong_side_of_zero_is_left_for_the_right_one(laboratory):

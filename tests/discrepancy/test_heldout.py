@@ -1,9 +1,11 @@
 """Data that were not used: other periods or another motion, on which a real effect holds and a wrong one does not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.heldout import held_out, other_periods
+from sea_ident.discrepancy.heldout import Kind, held_out, other_periods
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle
 
@@ -22,7 +24,7 @@ def with_ripple(laboratory):
 def test_every_other_period_is_held_out(ripple):
     bench, selection = ripple
     found = other_periods(bench, selection)
-    assert not found.other_motion
+    assert found.kind is Kind.OTHER_PERIODS
     assert "periods 2, 4, 6" in found.source
     np.testing.assert_array_equal(found.bench.data.period_tau_motor, bench.data.period_tau_motor[1::2])
     np.testing.assert_allclose(found.bench.data.tau_motor, bench.data.period_tau_motor[1::2].mean(axis=0))
@@ -35,7 +37,7 @@ def test_every_other_period_is_held_out(ripple):
 def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     found, warnings = held_out(*ripple, with_ripple)
     assert warnings == ()
-    assert found.other_motion
+    assert found.kind is Kind.OTHER_MOTION
     (transfer,) = found.transfers
     assert transfer.tested
     assert transfer.share == pytest.approx(1.0, abs=0.1)
@@ -45,6 +47,23 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     hip = [e.joint == "hip" and str(e.kind) == "motor" for e in found.bench.data.equations].index(True)
     power = [np.sum(np.abs(fit.residual[:, hip]) ** 2) for fit in (found.before, found.after)]
     assert power[1] < 0.3 * power[0]
+
+
+def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
+    """Whatever sensors and friction made of it, and wherever in it the recording begins."""
+    again = laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, seed=9)
+    later = replace(again, columns={name: np.roll(values, -317) for name, values in again.columns.items()})
+    for recording in (again, later):
+        found, warnings = held_out(*ripple, recording)
+        assert warnings == ()
+        assert found.kind is Kind.SAME_MOTION
+        assert not found.other_motion
+        # it is what was given that is tried, not periods of the recording itself
+        assert found.bench.data.periods == 5
+        assert found.recording is recording
+        assert found.transfers[0].share == pytest.approx(1.0, abs=0.1)
+        # and with another selection it stays the same data
+        assert found.again(ripple[1]).kind is Kind.SAME_MOTION
 
 
 def test_an_effect_that_is_not_there_does_not_hold(laboratory, ripple):
@@ -74,5 +93,5 @@ def test_five_periods_are_not_split(laboratory, ripple):
 
 def test_one_pass_tests_nothing_and_it_is_said(laboratory, ripple):
     found, warnings = held_out(*ripple, laboratory.record(periods=1, motion=1))
-    assert not found.other_motion
+    assert found.kind is Kind.OTHER_PERIODS
     assert "less than two periods" in warnings[0]

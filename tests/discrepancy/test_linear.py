@@ -52,6 +52,21 @@ def test_a_frame_serves_for_columns_nearby_and_does_no_harm_far_away(columns, ap
     np.testing.assert_allclose(others @ factor @ factor.T @ others.T, others @ usual @ usual.T @ others.T, atol=1e-9)
 
 
+def test_a_frame_of_other_columns_is_given_up():
+    """Far from orthonormal the products tell less than the columns: all is worked out anew."""
+    free, target = RNG.standard_normal((40, 6)), RNG.standard_normal(40)
+    frame = least_squares(free, target)[1]
+    # two of them nearly the same now, and one a thousand times as long
+    others = free.copy()
+    others[:, 1] = others[:, 0] + 1e-4 * others[:, 1]
+    others[:, 5] *= 1e3
+    usual, basis, factor = solve(others, target)
+    np.testing.assert_allclose(least_squares_near(frame, others, target), usual, rtol=1e-7)
+    near = solve_near(frame, others)
+    np.testing.assert_allclose(near[0] @ (near[0].T @ target), basis @ (basis.T @ target), atol=1e-9)
+    np.testing.assert_allclose(near[1] @ near[1].T, factor @ factor.T, rtol=1e-6)
+
+
 def test_a_basis_spans_the_columns_and_no_more(columns):
     basis = span(columns)
     assert basis.shape == (len(columns), np.linalg.matrix_rank(columns))

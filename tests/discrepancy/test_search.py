@@ -8,7 +8,7 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
-from sea_ident.discrepancy.search import BESIDE_ANOTHER, search, visible_changes
+from sea_ident.discrepancy.search import BESIDE_ANOTHER, _acceptable, search, visible_changes
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
@@ -76,6 +76,32 @@ def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_
     }
     assert sizes["torque_ripple"] == pytest.approx(8.0, rel=0.05)
     assert sizes["position_dependent_friction"] < BESIDE_ANOTHER * sizes["torque_ripple"]
+
+
+@pytest.mark.parametrize(
+    ("wave", "share", "beside_few", "beside_many"),
+    [(0.3, 0.7, True, True), (0.63, 0.35, True, False), (1.8, 0.06, False, False)],
+)
+def test_beside_many_effects_one_more_must_explain_half_of_what_is_left(
+    nothing_missing, wave, share, beside_few, beside_many
+):
+    """A ripple, and a wave in time that no effect of the library is: the larger it is, the less the ripple explains."""
+    data = nothing_missing[0].data
+    time, theta = data.motion.time - data.motion.time[0], data.motion.theta[:, 0]
+    torque = data.tau_motor.copy()
+    torque[:, 0] += np.sin(12.0 * theta) + wave * np.sin(2.0 * np.pi * 23.0 * time / data.period)
+    changed = replace(data, tau_motor=torque)
+    others = [make_effect("torque_offset", joint) for joint in ("hip", "knee", "ankle")]
+    others.append(make_effect("nonlinear_viscous_friction", "ankle", exponent=2.0))
+    usual = nothing_missing[0].effects
+    bench = Bench(changed, usual)
+    fit = bench.fit((*usual, *others), nothing_missing[1].noise)
+    new = bench.fit((*fit.effects, make_effect("torque_ripple", "hip", order=12.0)), nothing_missing[1].noise)
+    assert (fit.statistic - new.statistic) / fit.excess == pytest.approx(share, abs=0.1)
+    quiet, nothing = np.random.default_rng(0).standard_normal((8, len(fit.whitened))), np.zeros(len(data.equations))
+    # the same two models, with four effects that were added before it and with three
+    assert _acceptable(bench, fit, new, quiet, nothing) is beside_many
+    assert _acceptable(Bench(changed, (*usual, others[0])), fit, new, quiet, nothing) is beside_few
 
 
 def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):

@@ -34,6 +34,19 @@ def test_trends_that_overlap_are_told_apart_exactly():
     np.testing.assert_allclose([f.values for f in found], [[2.0, -1.0], [0.5, 3.0]], rtol=1e-9)
 
 
+def test_columns_that_differ_from_pass_to_pass_are_compared_without_their_mean_too():
+    """No pass is quite like another; what is without the mean over the periods is explained by what is without it."""
+    rng = np.random.default_rng(3)
+    alike, bent = course(rng), course(rng, 1, bent=True)
+    one, other = (
+        Course(c.profile, c.columns + 0.3 * rng.standard_normal(c.columns.shape), c.bend) for c in (alike, bent)
+    )
+    truth = [np.array([2.0, -1.0]), np.array([0.5])]
+    found = course_values(centred(put([one, other], truth)), [one, other])
+    for each, values in zip(found, truth, strict=True):
+        np.testing.assert_allclose(each.values, values, rtol=1e-9)
+
+
 @pytest.mark.parametrize("extra", [0.0, 3.0])
 def test_deviations_are_what_is_stated(extra):
     """White noise, and noise that gathers along the columns: deviations in their stated unit have an rms near one."""

@@ -80,6 +80,17 @@ def test_ambiguous_with_the_experiment_that_tells(leg, series):
     assert "next experiment" in found.text
 
 
+def test_not_in_the_library_though_something_much_like_it_is(model, intact):
+    """A ripple that grows with the load: one that does not is found, and what explains the recording better is said."""
+    theta, motor = intact.columns["theta_knee"], model.robot.joints[1].actuator
+    torque = 25.0 * (theta - intact.columns["q_knee"]) * np.sin(30.0 * theta)
+    current = intact.columns["current_knee"] + torque / (motor.gear_ratio * motor.torque_constant)
+    found = quietly(model, replace(intact, columns={**intact.columns, "current_knee": current}))
+    assert [(m.effect, m.joint) for m in found.missing] == [("torque_ripple", "knee")]
+    assert found.verdict is Verdict.NOT_IN_LIBRARY
+    assert "The same as torque_ripple at knee, but growing with the load, leaves" in found.text
+
+
 def test_only_against_the_reference(leg, series, model):
     payload = make_effect("payload", "ankle")
     values = np.resize([1.5, 0.0, 0.0, 0.15, 0.05, 0.05, 0.01, 0.0, 0.0, 0.0], len(payload.columns(leg)))
@@ -183,6 +194,15 @@ def test_the_same_samples_under_another_name_are_refused(model, intact):
     part = {name: values[half] for name, values in intact.columns.items()}
     with pytest.raises(DiagnosisError, match="proves nothing"):
         sea_ident.diagnose(model, intact, holdout=type(intact)(intact.time[half], part, "half of it"))
+
+
+@pytest.mark.parametrize("column", ["q_ankle", "current_knee"])
+def test_a_dead_channel_is_refused_in_either_recording(model, intact, column):
+    dead = changed(intact, **{column: np.full(len(intact.time), 0.5)})
+    with pytest.raises(DiagnosisError, match=f"column {column} is constant"):
+        sea_ident.diagnose(model, dead)
+    with pytest.raises(DiagnosisError, match=f"column {column} is constant"):
+        sea_ident.diagnose(model, intact, holdout=dead)
 
 
 def test_the_order_of_the_columns_does_not_matter(model, intact):

@@ -1,12 +1,14 @@
 """The words of a diagnosis."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.trend import TrendTest
-from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph
+from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph, reservations
 from sea_ident.effects import make_effect
 
 
@@ -52,3 +54,29 @@ def test_of_what_drifts_no_gap_of_the_mean_is_told():
     assert "shows in the comparison of the periods" in text
     assert "gap" not in text
     assert "the gap on this recording goes from 0.5" in paragraph(facts(Verdict.NAMED))
+
+
+@pytest.mark.parametrize(
+    ("kind", "where", "reservation"),
+    [
+        (Kind.OTHER_MOTION, "On the motion that was held out the gap shrinks by 80 %", None),
+        (
+            Kind.SAME_MOTION,
+            "On the recording that was held out (the same motion again, which is a weaker test) the gap shrinks",
+            "repeats the motion of this one, which is weaker",
+        ),
+        (
+            Kind.OTHER_PERIODS,
+            "On periods that were held out (the same motion again, which is a weaker test) the gap shrinks",
+            "every other period of this one was held out",
+        ),
+        (None, "", "was not tested on another motion"),
+    ],
+)
+def test_what_was_held_out_is_said_and_how_far_it_can_be_trusted(kind, where, reservation):
+    gap = Gap({"hip": 0.5}, {"hip": 0.1}, {"hip": 0.1})
+    told = replace(facts(Verdict.NAMED), held=None if kind is None else gap, kind=kind)
+    assert where in paragraph(told)
+    assert ("held out" in paragraph(told)) is (kind is not None)
+    found = reservations(told)
+    assert found == [] if reservation is None else len(found) == 1 and reservation in found[0]

@@ -128,9 +128,8 @@ def test_shapes_lie_inside_their_ranges(name, leg):
         for shape in effect.shapes:
             assert shape.lower <= getattr(effect, shape.name) <= shape.upper
             grid = shape.grid()
-            rounding = 1e-12 * max(abs(shape.lower), abs(shape.upper))
-            assert grid.min() >= shape.lower - rounding
-            assert grid.max() <= shape.upper + rounding
+            assert grid.min() >= shape.lower - 1e-12 * abs(shape.lower)
+            assert grid.max() <= shape.upper + 1e-12 * abs(shape.upper)
 
 
 def test_the_torque_in_a_simulation_is_that_of_the_columns(leg):

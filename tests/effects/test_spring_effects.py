@@ -76,3 +76,40 @@ def test_play_in_series_leaves_the_torque_of_the_whole_spring_at_what_is_beyond_
     beyond = d - np.clip(d, -0.01, 0.01)
     torque = 200.0 * d + 8000.0 * d**3 + 200.0 * play.evaluate(State(leg, motion)).motor[:, 1, 0]
     np.testing.assert_allclose(torque, 200.0 * beyond + 8000.0 * beyond**3, rtol=1e-9, atol=1e-12)
+
+
+def test_play_follows_the_cubic_stiffness_only_where_the_spring_has_a_law():
+    leg = load_robot("exo_leg")
+    play = make_effect("backlash", "knee", cubic=7.0)
+
+    def cubic(**values):
+        parameters = {f"knee.{name}": value for name, value in values.items()}
+        return play.anchored(Anchor(leg, (), parameters)).cubic
+
+    assert cubic(spring_stiffness=200.0, spring_stiffening=8000.0) == 40.0
+    assert cubic(spring_stiffness=200.0) == 0.0
+    # a softening law would turn over within a few deflections: nothing that a spring in series does
+    assert cubic(spring_stiffness=200.0, spring_stiffening=-8000.0) == 0.0
+    # a bent fit is no law
+    for stiffness in (0.0, -200.0):
+        assert cubic(spring_stiffness=stiffness, spring_stiffening=8000.0) == 7.0
+
+
+def test_the_stiffness_of_play_is_about_that_of_the_spring_it_is_in_series_with():
+    play, spring = make_effect("backlash", "knee"), {"knee.spring_stiffness": 200.0, "hip.spring_stiffness": 2.0}
+    assert [play.plausible(np.array([k]), spring) for k in (200.0, 100.0, 400.0)] == [True] * 3
+    assert [play.plausible(np.array([k]), spring) for k in (50.0, 700.0, -200.0, 2.0)] == [False] * 4
+
+
+def test_beside_the_cubic_stiffness_stands_one_other_power_and_none_beside_that():
+    leg = load_robot("exo_leg")
+    state = State(leg, random_motion(leg, samples=20, seed=4))
+    cubic = make_effect("spring_stiffening", "knee")
+    other = cubic.beside()
+    assert other.beside() is None
+    powers = {one.exponent for one in other.variants(state)}
+    assert powers == {2.0, 5.0}  # neither the one that is in the model nor its neighbours, which are much like it
+    for one in other.variants(state):
+        assert {c.name for c in one.columns(leg)}.isdisjoint(c.name for c in cubic.columns(leg))
+        assert np.all(np.isnan(one.prior(leg)))
+    assert 3.0 in {one.exponent for one in cubic.variants(state)}

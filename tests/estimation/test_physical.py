@@ -7,6 +7,7 @@ import pytest
 from estimation.synthetic import record
 from sea_ident.effects import base_effects
 from sea_ident.estimation import Box, JointWLS, Pull, identify, physical_parameters
+from sea_ident.estimation.physical import _Problem
 from sea_ident.estimation.pseudo_inertia import inertial_parameters, pseudo_inertia
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import FourierSeries, Motion
@@ -75,6 +76,23 @@ def test_no_friction_stays_below_zero_by_however_little(model, value):
     values[model.names.index("ankle.coulomb_friction")] = value
     found = physical_parameters(replace(model, values=values))
     assert 0.0 <= found.named()["ankle.coulomb_friction"] < 1e-3
+
+
+def test_a_solver_that_ends_outside_by_its_accuracy_leaves_a_robot_that_can_be_built(model, monkeypatch):
+    solved = _Problem.drawn_or_nearest
+
+    def beside(problem, target, nearest, pull):
+        values, drawn_by = solved(problem, target, nearest, pull)
+        values[problem.signed] = -1e-9 * problem.scale[problem.signed]
+        return values, drawn_by
+
+    monkeypatch.setattr(_Problem, "drawn_or_nearest", beside)
+    found = physical_parameters(model)
+    signed = [k for k, c in enumerate(found.columns) if c.effect in ("rotor_inertia", "coulomb_friction")]
+    assert signed
+    assert np.all(found.values[signed] == 0.0)
+    assert np.all(found.robot().rotor_inertias() == 0.0)
+    np.testing.assert_allclose(found.base_values, found.model.base.project(found.values))
 
 
 def test_negative_friction_becomes_zero(model):

@@ -1,13 +1,16 @@
 """`sea-ident diagnose`: where model and data disagree, and which effect is missing."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
 from sea_ident.cli.inputs import read_columns
 from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, RecordingFile, ReportFile
 from sea_ident.cli.output import SHARES, by_share, check_targets, emit, note, progress
+
+if TYPE_CHECKING:
+    from sea_ident.discrepancy import Verdict
 
 
 def diagnose(
@@ -56,19 +59,11 @@ def diagnose(
             progress=by_share(tell),
         )
     found.save(out)
-    files = [str(out)]
-    if model_out is not None:
-        if found.model is None:
-            note(f"warning: {model_out} is not written: there is no repaired model with the verdict {found.verdict}")
-        else:
-            found.model.save(model_out)
-            files.append(str(model_out))
-    if next_out is not None:
-        if found.next_experiment is None:
-            note(f"warning: {next_out} is not written: the verdict {found.verdict} comes without a next experiment")
-        else:
-            found.next_experiment.save(next_out)
-            files.append(str(next_out))
+    files = [
+        str(out),
+        *_saved(model_out, found.model, f"the verdict {found.verdict} comes without a repaired model"),
+        *_saved(next_out, found.next_experiment, _no_next(found.verdict)),
+    ]
     if report is not None:
         from sea_ident.report import write_report
 
@@ -76,3 +71,29 @@ def diagnose(
             write_report(found, report)
         files.append(str(report))
     emit({**found.to_dict(), "files": files}, f"{found.summary()}\nwritten: {', '.join(files)}", as_json=as_json)
+
+
+class _Part(Protocol):
+    """What can be saved of a diagnosis."""
+
+    def save(self, path: Path) -> None:
+        """Write it."""
+
+
+def _saved(target: Path | None, part: _Part | None, why_not: str) -> list[str]:
+    """Names of what was written; what was asked for and does not exist is told, and that an older file is not it."""
+    if target is None:
+        return []
+    if part is None:
+        older = "; the file of that name is an older one" if target.exists() else ""
+        note(f"warning: {target} is not written: {why_not}{older}")
+        return []
+    part.save(target)
+    return [str(target)]
+
+
+def _no_next(verdict: "Verdict") -> str:
+    """Why there is no next experiment."""
+    if verdict == "ambiguous":
+        return "no motion was found that tells the effects apart better (the diagnosis says more)"
+    return f"it is for an ambiguous pair, and the verdict is {verdict}"
