@@ -9,6 +9,7 @@ from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
@@ -161,9 +162,10 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     start = settle(bench, bench.effects)
     before = compare_periods(bench, start.fit, start.noise, temperature)
     found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
-    if _names(found.trends) == _names(before):
-        return found
-    return _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
+    if _names(found.trends) != _names(before):
+        found = _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
+    beside = searched_beside_reversals(found.bench, found.confirmed)
+    return found if beside is None else replace(found, bench=beside.bench, confirmed=beside)
 
 
 def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:

@@ -152,7 +152,7 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
         tests = max(sum(c.tests for c in candidates), 1)
         if len(added) >= MOST_EFFECTS:
             break
-        step = _next(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest))
+        step = next_effect(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest))
         if step is None:
             break
         new, p_value = step
@@ -177,7 +177,7 @@ def search(bench: Bench, effects: Sequence[Effect]) -> Selection:
     return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
 
 
-def _next(
+def next_effect(
     bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray
 ) -> tuple[Fit, float] | None:
     """The best candidate refitted with everything free and its significance, None where none is worth it.
