@@ -164,8 +164,8 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
     if _names(found.trends) != _names(before):
         found = _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
-    beside = searched_beside_reversals(found.bench, found.confirmed)
-    return found if beside is None else replace(found, bench=beside.bench, confirmed=beside)
+    bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
+    return replace(found, bench=bench, confirmed=confirmed)
 
 
 def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:

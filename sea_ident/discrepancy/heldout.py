@@ -13,7 +13,7 @@ from sea_ident.discrepancy.gap import gap_of, torque_by_joint
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
-from sea_ident.discrepancy.standing import NEXT_TO_REVERSALS, compared_next_to_reversals
+from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -91,8 +91,8 @@ def held_out(
         return other_periods(bench, selection), tuple(warnings)
     if bench.data.caution > data.caution:
         data = away_from_reversals(data, bench.data.caution)
-    elif bench.data.caution == NEXT_TO_REVERSALS:
-        data = compared_next_to_reversals(data)
+    elif bench.data.caution == BESIDE_REVERSALS:
+        data = compared_beside_reversals(data)
     found = tried(Bench(data, bench.effects), selection, processed.source)
     gap = gap_of(found.bench, found.before, found.after, found.noise)
     lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench))

@@ -19,6 +19,9 @@ LARGEST_TIMES_TORQUE = 1.5
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
 
+FEWEST_TO_SCATTER = 4
+"""Periods from which on their scatter along a change is known."""
+
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
 
@@ -70,12 +73,16 @@ def scatter_p(periods: FloatArray, change: FloatArray) -> float:
     Returns:
         Probability by Student's t; 0 where there are too few periods to tell.
     """
-    count = len(periods)
-    if count < 4:
+    if len(periods) < FEWEST_TO_SCATTER:
         return 0.0
+    size = float(np.linalg.norm(change))
+    return 2.0 * float(stats.t.sf(size / max(spread(periods, change), 1e-300), step_freedom(len(periods))))
+
+
+def spread(periods: FloatArray, change: FloatArray) -> float:
+    """Standard deviation of the mean of the periods (P, M) along a change (M,), from one period to the next."""
     along = periods @ change / np.linalg.norm(change)
-    spread = float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / count))
-    return 2.0 * float(stats.t.sf(float(np.linalg.norm(change)) / max(spread, 1e-300), step_freedom(count)))
+    return float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / len(periods)))
 
 
 def at_a_bound(effect: Effect) -> bool:
