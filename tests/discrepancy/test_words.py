@@ -1,12 +1,14 @@
 """The words of a diagnosis."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
-from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph
+from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph, reservations
 from sea_ident.effects import make_effect
 
 
@@ -52,3 +54,15 @@ def test_of_what_drifts_no_gap_of_the_mean_is_told():
     assert "shows in the comparison of the periods" in text
     assert "gap" not in text
     assert "the gap on this recording goes from 0.5" in paragraph(facts(Verdict.NAMED))
+
+
+@pytest.mark.parametrize(("unit", "speed"), [("N m", "0.003 rad/s"), ("N", "0.003 m/s")])
+def test_what_is_not_compared_is_said_where_nothing_is_missing_and_warned_of_where_it_is_much(unit, speed):
+    nothing = replace(facts(Verdict.NONE, p_value=0.5), missing=(), units={"hip": unit})
+    little, much = (replace(nothing, standing=Standing("hip", share, 0.003)) for share in (0.021, 0.21))
+    assert f"2.1% of the samples of hip are not compared (up to {speed};" in paragraph(little)
+    assert "stiction or presliding, cannot be excluded." in paragraph(little)
+    assert reservations(little, held_out=True) == []
+    assert [text[:23] for text in reservations(much, held_out=True)] == ["Beside reversals 21.0% "]
+    assert "not compared" not in paragraph(replace(much, verdict=Verdict.NAMED))
+    assert "not compared" not in paragraph(replace(nothing, standing=Standing("hip", 0.0, 0.0)))
