@@ -200,7 +200,7 @@ def _tested(
     """What was found, tested on data that were not used.
 
     Another motion decides between equals, and what does not hold on it beside what does was the form of the latter, no
-    effect of its own.
+    effect of its own. Where nothing holds, the worst is what spoils the others, for each is tried beside all of them.
     """
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
@@ -208,8 +208,7 @@ def _tested(
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
-    weak = [k for k, found in enumerate(held.transfers) if not found.holds]
-    if 0 < len(weak) < confirmed.selection.added + len(trends.trends):
+    while weak := _out(held, len(trends.trends)):
         selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
         held = replace(
             tried(held.bench, selection, held.source),
@@ -218,6 +217,14 @@ def _tested(
         selection, alternatives, held = decide(bench, selection, alternatives, held)
         confirmed = confirmed.less(selection)
     return confirmed, alternatives, held, notes
+
+
+def _out(held: HeldOut, drifting: int) -> list[int]:
+    """Which effects do not hold on another motion, of those of which something is left beside as many that drift."""
+    weak = [k for k, found in enumerate(held.transfers) if not found.holds]
+    if len(weak) < len(held.transfers) + drifting:
+        return weak
+    return [min(weak, key=lambda k: held.transfers[k].share)] if len(weak) > 1 else []
 
 
 def _with_alternatives(bench: Bench, selection: Selection) -> tuple[Selection, Alternatives]:
