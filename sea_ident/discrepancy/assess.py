@@ -24,7 +24,7 @@ from sea_ident.discrepancy.judge import (
 )
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, step_freedom
-from sea_ident.discrepancy.search import FAMILY_LEVEL, SCATTER_LEVEL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.search import FAMILY_LEVEL, NEARLY_RIGHT, SCATTER_LEVEL, Selection, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
 from sea_ident.effects import Effect, Side
@@ -38,6 +38,9 @@ LOOKS_ALIKE = 0.9
 
 RIVALS = 8
 """Candidates that are tried in the place of an effect, and the best of every kind beside them."""
+
+NO_BETTER = 0.5
+"""Where an effect has not the form of what is there, one that leaves no more than this share more is no worse [-]."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
@@ -58,6 +61,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
         unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        enough = EQUALLY_GOOD * unit if unit < NEARLY_RIGHT else max(EQUALLY_GOOD * unit, NO_BETTER * fit.excess)
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
@@ -69,11 +73,11 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if slowest(new.effects[position]):
                 continue
-            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
+            if new.statistic - fit.statistic < enough and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
                 other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-                if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit:
+                if new.statistic - fit.statistic + price < enough:
                     alike.append(other)
                     scores.append(new.statistic)
                 else:
