@@ -24,7 +24,15 @@ from sea_ident.discrepancy.judge import (
 )
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, step_freedom
-from sea_ident.discrepancy.search import FAMILY_LEVEL, NEARLY_RIGHT, SCATTER_LEVEL, Selection, of_every_kind, refitted
+from sea_ident.discrepancy.search import (
+    FAMILY_LEVEL,
+    LITTLE_LEFT,
+    NEARLY_RIGHT,
+    SCATTER_LEVEL,
+    Selection,
+    of_every_kind,
+    refitted,
+)
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
 from sea_ident.effects import Effect, Side
@@ -40,7 +48,8 @@ RIVALS = 8
 """Candidates that are tried in the place of an effect, and the best of every kind beside them."""
 
 NO_BETTER = 0.5
-"""Where an effect has not the form of what is there, one that leaves no more than this share more is no worse [-]."""
+"""Where an effect explains nearly all and has not the form of what is there, one that leaves no more than this share
+more is no worse [-]."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
@@ -60,8 +69,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
-        unit = max(fit.statistic / max(fit.dof, 1), 1.0)
-        enough = EQUALLY_GOOD * unit if unit < NEARLY_RIGHT else max(EQUALLY_GOOD * unit, NO_BETTER * fit.excess)
+        enough = no_worse(fit, gain)
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
@@ -89,6 +97,14 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (not a.dearer, a.cos2))}
         found[position] = tuple(sorted(unique.values(), key=lambda a: (a.dearer, -a.cos2)))
     return found
+
+
+def no_worse(fit: Fit, gain: float) -> float:
+    """Difference of the statistic up to which another effect does as well as the one of a fit that has this gain."""
+    unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+    if unit > NEARLY_RIGHT and fit.excess < LITTLE_LEFT * gain:
+        return max(EQUALLY_GOOD * unit, NO_BETTER * fit.excess)
+    return EQUALLY_GOOD * unit
 
 
 def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
