@@ -12,8 +12,8 @@ from sea_ident.discrepancy.trend import TrendTest
 
 FEW_PERIODS = 10
 
-STANDS_LONG = 0.05
-"""Share of the samples of a joint that are not compared from which on a user is warned [-]."""
+STANDS_LONG = 0.1
+"""Share of the samples of a joint that are not compared from which on a user is warned; usual are 2 to 6 % [-]."""
 
 DISAGREES = 1e-3
 """Probability of the lack of fit by noise below which model and data are said to disagree."""
