@@ -8,15 +8,26 @@ from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.candidates import ABSORBED, Candidate, effect_key, scan
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit, Known
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical, significance, slowest
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
+from sea_ident.discrepancy.judge import (
+    EQUALLY_GOOD,
+    FEWEST_TO_SCATTER,
+    flat_periods,
+    penalty,
+    physical,
+    significance,
+    slowest,
+    spread,
+)
+from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, step_freedom
 from sea_ident.discrepancy.refit import of_every_kind, refitted
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection
+from sea_ident.discrepancy.search import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, Selection
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
 from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
 
@@ -28,6 +39,10 @@ LOOKS_ALIKE = 0.9
 
 RIVALS = 8
 """Candidates that are tried in the place of an effect, and the best of every kind beside them."""
+
+NO_BETTER = 0.5
+"""Where an effect explains nearly all and has not the form of what is there, one that leaves no more than this share
+more is no worse [-]."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
@@ -47,7 +62,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
-        unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        enough = no_worse(fit, gain)
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
@@ -55,16 +70,16 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         for candidate in of_every_kind(tried, RIVALS):
             if candidate.gain < 0.3 * gain:
                 continue
-            beat = fit.statistic + EQUALLY_GOOD * unit
+            beat = fit.statistic + enough
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
             if slowest(new.effects[position]):
                 continue
-            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and physical(bench, new, position):
+            if new.statistic - fit.statistic < enough and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened
                 share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
                 other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-                if new.statistic - fit.statistic + price < EQUALLY_GOOD * unit:
+                if new.statistic - fit.statistic + price < enough:
                     alike.append(other)
                     scores.append(new.statistic)
                 else:
@@ -76,6 +91,14 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (not a.dearer, a.cos2))}
         found[position] = tuple(sorted(unique.values(), key=lambda a: (a.dearer, -a.cos2)))
     return found
+
+
+def no_worse(fit: Fit, gain: float) -> float:
+    """Difference of the statistic up to which another effect does as well as the one of a fit that has this gain."""
+    unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+    if unit > NEARLY_RIGHT and fit.excess < LITTLE_LEFT * gain:
+        return max(EQUALLY_GOOD * unit, NO_BETTER * fit.excess)
+    return EQUALLY_GOOD * unit
 
 
 def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
@@ -183,10 +206,23 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
 
 
 def detectability(
-    bench: Bench, fit: Fit, noise: NoiseFloor, candidates: Sequence[Candidate]
+    bench: Bench, fit: Fit, noise: NoiseFloor, candidates: Sequence[Candidate], judged: tuple[Bench, Settled]
 ) -> tuple[Detectability, ...]:
-    """Smallest size of every candidate that would have been found, and what it is easily taken for."""
+    """Smallest size of every candidate that would have been found, and what it is easily taken for.
+
+    Args:
+        bench: the recording.
+        fit: what was found.
+        noise: noise floor.
+        candidates: around it.
+        judged: the recording with all that is compared beside reversals, and the model there: what lives there is as
+            large as it would have to be in these samples.
+
+    Returns:
+        One entry for every candidate.
+    """
     tests = max(sum(c.tests for c in candidates), 1)
+    periods = flat_periods(*judged) if judged[0].data.periods > 1 else np.zeros((0, 0))
     candidates = [c for c in candidates if np.any(c.directions)]
     bases = [_orthonormal(c.directions) for c in candidates]
     labels = [_label(c) for c in candidates]
@@ -197,11 +233,14 @@ def detectability(
     share = np.add.reduceat(np.add.reduceat(gram**2, starts[:-1], axis=0), starts[:-1], axis=1) if len(gram) else gram
     out = []
     for i, candidate in enumerate(candidates):
-        threshold = float(stats.f.isf(FAMILY_LEVEL / tests, candidate.columns, max(noise.total_freedom, 4.0)))
-        needed = np.sqrt(threshold * candidate.columns) + POWER_QUANTILE
         strength = np.linalg.norm(candidate.directions, axis=0)
         best = int(np.argmax(strength)) if len(strength) else 0
+        needed = _needed(candidate.columns, tests, noise)
         smallest = needed / strength[best] if len(strength) and strength[best] > 0.0 else float("inf")
+        absorbed, effect = candidate.absorbed, candidate.effect
+        if effect.name in LIVE_BESIDE_REVERSALS:
+            effect = _usual(effect)
+            smallest, absorbed = _beside_reversals(judged, effect, tests, periods)
         mine = slice(starts[i], starts[i + 1])
         alike = []
         for k in range(len(candidates)):
@@ -215,11 +254,59 @@ def detectability(
                 joint=candidate.effect.joint,
                 smallest=float(smallest),
                 unit=_unit(bench, candidate.effect, best),
-                absorbed=float(np.clip(candidate.absorbed, 0.0, 1.0)),
+                absorbed=float(np.clip(absorbed, 0.0, 1.0)),
                 confusable_with=tuple(alike),
+                shapes=_shapes(bench, effect),
             )
         )
     return tuple(sorted(out, key=lambda d: (d.effect, str(d.joint))))
+
+
+def _needed(columns: int, tests: int, noise: NoiseFloor) -> float:
+    """Size of an effect in units of the noise that is found 19 times out of 20."""
+    threshold = float(stats.f.isf(FAMILY_LEVEL / tests, columns, max(noise.total_freedom, 4.0)))
+    return float(np.sqrt(threshold * columns)) + POWER_QUANTILE
+
+
+def _usual(effect: Effect) -> Effect:
+    """An effect with the shapes that its kind has where nothing is known of them."""
+    return replace(effect, **{shape.name: getattr(type(effect), shape.name) for shape in effect.shapes})
+
+
+def _beside_reversals(
+    judged: tuple[Bench, Settled], effect: Effect, tests: int, periods: FloatArray
+) -> tuple[float, float]:
+    """Smallest size of an effect that lives beside reversals and would have been found there, and what is absorbed.
+
+    It has to stand out of the scatter of the periods along its own column too, which is more there than the noise
+    floor, one for all phases of a period, says.
+
+    Args:
+        judged: the recording with all that is compared there, and the model.
+        effect: the effect.
+        tests: number of shapes of all candidates.
+        periods: (P, M) whitened residuals of the periods.
+
+    Returns:
+        The size, and the share of its power that the model absorbs.
+    """
+    bench, settled = judged
+    fit = settled.fit
+    column = whiten(bench.whitener(settled.noise), bench.column_spectra(effect, fit.effects) * fit.scale[:, None])
+    across = fit.off(off(bench.free_basis(settled.noise), column))[:, 0]
+    strength, power = float(np.linalg.norm(across)), float(np.sum(column**2))
+    if not strength**2 > ABSORBED * power:
+        return float("inf"), 1.0
+    size = _needed(1, tests, settled.noise)
+    if len(periods) >= FEWEST_TO_SCATTER:
+        least = float(stats.t.isf(SCATTER_LEVEL / 2.0, step_freedom(len(periods))))
+        size = max(size, (least + POWER_QUANTILE) * spread(periods, across))
+    return size / strength, 1.0 - strength**2 / power
+
+
+def _shapes(bench: Bench, effect: Effect) -> tuple[tuple[str, float, str], ...]:
+    """Name, value and unit of the shapes of an effect."""
+    return tuple((s.name, float(getattr(effect, s.name)), effect.shape_unit(s, bench.robot)) for s in effect.shapes)
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:

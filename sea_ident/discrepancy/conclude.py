@@ -33,6 +33,7 @@ from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.discrepancy.standing import longest_standing
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects.signal import SignalEffect
 
@@ -114,11 +115,14 @@ def conclude(
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     if nameless and verdict in (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS):
         verdict = Verdict.NOT_IN_LIBRARY
+    judged = confirmed.beside or (confirmed.bench, confirmed.final)
+    standing = longest_standing(judged[0].data)
     facts = words.Facts(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
         kind=None if held is None else held.kind, nameless=nameless, sound=not notes.fatal,
+        standing=standing,
     )  # fmt: skip
     found = Diagnosis(
         verdict=verdict,
@@ -130,7 +134,7 @@ def conclude(
         missing=tuple(missing),
         training=gap,
         holdout=held_gap,
-        detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates),
+        detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates, judged),
         warnings=tuple(dict.fromkeys((*notes.warnings, *trends.notes, *words.reservations(facts)))),
         waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
         recording=bench.data.source,

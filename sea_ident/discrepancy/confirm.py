@@ -39,6 +39,8 @@ class Confirmed:
         final: the model with the effects added, there.
         among_the_slow: rms of what the model leaves among slow samples that were left out, as a share of the torque
             [-].
+        beside: the recording with what is slow beside reversals compared, and the model there; None where that was not
+            looked at.
     """
 
     selection: Selection
@@ -46,6 +48,7 @@ class Confirmed:
     start: Settled
     final: Settled
     among_the_slow: float = 0.0
+    beside: tuple[Bench, Settled] | None = None
 
     def less(self, selection: Selection) -> "Confirmed":
         """The same with less found."""

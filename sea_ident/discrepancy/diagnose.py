@@ -9,6 +9,7 @@ from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
@@ -161,9 +162,10 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     start = settle(bench, bench.effects)
     before = compare_periods(bench, start.fit, start.noise, temperature)
     found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
-    if _names(found.trends) == _names(before):
-        return found
-    return _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
+    if _names(found.trends) != _names(before):
+        found = _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
+    bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
+    return replace(found, bench=bench, confirmed=confirmed)
 
 
 def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
@@ -198,7 +200,7 @@ def _tested(
     """What was found, tested on data that were not used.
 
     Another motion decides between equals, and what does not hold on it beside what does was the form of the latter, no
-    effect of its own.
+    effect of its own. Where nothing holds, the worst is what spoils the others, for each is tried beside all of them.
     """
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
@@ -206,13 +208,20 @@ def _tested(
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
-    weak = [k for k, found in enumerate(held.transfers) if not found.holds]
-    if 0 < len(weak) < confirmed.selection.added + len(trends.trends):
+    while weak := _out(held, len(trends.trends)):
         selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
         held = held.again(selection)
         selection, alternatives, held = decide(bench, selection, alternatives, held)
         confirmed = confirmed.less(selection)
     return confirmed, alternatives, held, notes
+
+
+def _out(held: HeldOut, drifting: int) -> list[int]:
+    """Which effects do not hold on another motion, of those of which something is left beside as many that drift."""
+    weak = [k for k, found in enumerate(held.transfers) if not found.holds]
+    if len(weak) < len(held.transfers) + drifting:
+        return weak
+    return [min(weak, key=lambda k: held.transfers[k].share)] if len(weak) > 1 else []
 
 
 def _with_alternatives(bench: Bench, selection: Selection) -> tuple[Selection, Alternatives]:

@@ -130,6 +130,7 @@ class Diagnosis:
                 {
                     "effect": d.effect, "joint": d.joint, "smallest": d.smallest if np.isfinite(d.smallest) else None,
                     "unit": d.unit, "absorbed": d.absorbed, "confusable_with": list(d.confusable_with),
+                    "shapes": [{"name": name, "value": value, "unit": unit} for name, value, unit in d.shapes],
                 }
                 for d in self.detectability
             ],
@@ -246,6 +247,7 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
             Detectability(
                 d["effect"], d["joint"], float("inf") if d["smallest"] is None else _finite(d["smallest"]), d["unit"],
                 _finite(d["absorbed"]), tuple(str(other) for other in d["confusable_with"]),
+                tuple((str(x["name"]), _finite(x["value"]), str(x["unit"])) for x in d.get("shapes", [])),
             )
             for d in record["detectability"]
         ),

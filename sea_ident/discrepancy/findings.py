@@ -192,6 +192,7 @@ class Detectability:
         unit: its unit.
         absorbed: share of the effect that the other parameters absorb [-].
         confusable_with: effects (`name` or `name at joint`) that look like it in this motion.
+        shapes: name, value and unit of the nonlinear parameters that it has there; of others the smallest differs.
     """
 
     effect: str
@@ -200,6 +201,7 @@ class Detectability:
     unit: str
     absorbed: float
     confusable_with: tuple[str, ...]
+    shapes: tuple[tuple[str, float, str], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """Data that were not used in the fit: another recording, or where none was given, every other period."""
 
 import warnings as python_warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -11,10 +12,13 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of, torque_by_joint
-from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -102,6 +106,8 @@ def held_out(
         return other_periods(bench, selection), tuple(warnings)
     if bench.data.caution > data.caution:
         data = away_from_reversals(data, bench.data.caution)
+    elif bench.data.caution == BESIDE_REVERSALS:
+        data = compared_beside_reversals(data)
     found = tried(Bench(data, bench.effects), selection, processed.source)
     gap = gap_of(found.bench, found.before, found.after, found.noise)
     lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench))
@@ -144,9 +150,33 @@ def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     start, final = selection.start.fit, selection.final.fit
     before = other.predicted(start.effects, start.parameters)
     after = other.predicted(final.effects, final.parameters)
+    remembering = [effect.required_joint for effect in selection.effects if isinstance(effect, SpringHysteresis)]
+    before, after = (without_history(other, fit, remembering) for fit in (before, after))
     now: Settled = settle_again(other, after)
     transfers = tuple(assess.transfer(other, selection, now)) if selection.added else ()
     return HeldOut(other, before, after, other.noise(after), transfers, source)
+
+
+def without_history(bench: Bench, fit: Fit, joints: Sequence[str]) -> Fit:
+    """A model with given parameters less what springs with dry friction may remember of the time before.
+
+    Where such a spring rests depends on how it was loaded last: a constant that no periodic motion tells, and none
+    takes along to another.
+
+    Args:
+        bench: the recording.
+        fit: the model on it.
+        joints: those with such a spring.
+
+    Returns:
+        The same with a residual that has no constant torque of these springs in it.
+    """
+    if not joints:
+        return fit
+    columns = np.concatenate([bench.column_spectra(SpringOffset(joint), fit.effects) for joint in joints], axis=2)
+    amounts = np.linalg.lstsq(stacked(columns), stacked(fit.residual), rcond=None)[0]
+    residual = fit.residual - columns @ amounts
+    return replace(fit, residual=residual, whitened=stacked(residual))
 
 
 def _every_other(data: PeriodData, first: int) -> PeriodData:

@@ -12,12 +12,19 @@ from sea_ident.discrepancy.noise import NoiseFloor, step_freedom
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
 
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
+
+SLIPPING = 0.1
+"""Share of the torque of dry friction in a spring that must be in elements that slip to and fro [-]."""
+
+FEWEST_TO_SCATTER = 4
+"""Periods from which on their scatter along a change is known."""
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
@@ -70,12 +77,16 @@ def scatter_p(periods: FloatArray, change: FloatArray) -> float:
     Returns:
         Probability by Student's t; 0 where there are too few periods to tell.
     """
-    count = len(periods)
-    if count < 4:
+    if len(periods) < FEWEST_TO_SCATTER:
         return 0.0
+    size = float(np.linalg.norm(change))
+    return 2.0 * float(stats.t.sf(size / max(spread(periods, change), 1e-300), step_freedom(len(periods))))
+
+
+def spread(periods: FloatArray, change: FloatArray) -> float:
+    """Standard deviation of the mean of the periods (P, M) along a change (M,), from one period to the next."""
     along = periods @ change / np.linalg.norm(change)
-    spread = float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / count))
-    return 2.0 * float(stats.t.sf(float(np.linalg.norm(change)) / max(spread, 1e-300), step_freedom(count)))
+    return float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / len(periods)))
 
 
 def at_a_bound(effect: Effect) -> bool:
@@ -126,6 +137,21 @@ def slowest(effect: Effect) -> bool:
     return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.shapes)
 
 
+def dissipates(bench: Bench, effect: Effect, values: FloatArray) -> bool:
+    """Whether a spring with dry friction is one on this motion: what never slips to and fro is elastic, and an offset.
+
+    Args:
+        bench: the recording.
+        effect: any effect.
+        values: (k,) of its columns.
+    """
+    if not isinstance(effect, SpringHysteresis):
+        return True
+    travel = float(np.ptp(bench.data.motion.deflection[:, bench.robot.index(effect.required_joint)]))
+    slipping = 2.0 * effect.slips < travel
+    return float(np.sum(np.abs(values[slipping]))) > SLIPPING * float(np.sum(np.abs(values)))
+
+
 def physical(bench: Bench, fit: Fit, position: int) -> bool:
     """Whether an effect of a model is possible.
 
@@ -140,7 +166,7 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
     if not columns:
         return True
     values = fit.values[start : start + len(columns)]
-    if not effect.plausible(values, fit.parameters):
+    if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
         return False
     spectra = bench.column_spectra(effect, fit.effects)
     power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))

@@ -137,7 +137,7 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
         tests = max(sum(c.tests for c in candidates), 1)
         if len(added) >= MOST_EFFECTS:
             break
-        step = _next(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest), tried)
+        step = next_effect(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest), tried)
         if step is None:
             break
         new, p_value = step
@@ -172,8 +172,13 @@ def _largest_changes(bench: Bench, fit: Fit, added: int) -> FloatArray:
     return largest
 
 
-def _next(
-    bench: Bench, now: Settled, candidates: list[Candidate], tests: int, smallest: FloatArray, tried: Tried
+def next_effect(
+    bench: Bench,
+    now: Settled,
+    candidates: list[Candidate],
+    tests: int,
+    smallest: FloatArray,
+    tried: Tried | None = None,
 ) -> tuple[Fit, float] | None:
     """The best candidate refitted with everything free and its significance, None where none is worth it.
 
@@ -214,8 +219,9 @@ def _next(
     if best is None:
         return None
     own, whole_gain = effect_key(best[1].effects[-1]), fit.statistic - best[1].statistic
-    for candidate, gain in refits:
-        tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
+    if tried is not None:
+        for candidate, gain in refits:
+            tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
     return best[1], best[2]
 
 

@@ -164,7 +164,7 @@ def diagnose_unrepeated(
         ),
         missing=tuple(missing),
         training=gap,
-        detectability=assess.detectability(bench, now.fit, now.noise, _candidates(bench, now)),
+        detectability=assess.detectability(bench, now.fit, now.noise, _candidates(bench, now), (bench, now)),
         warnings=tuple(dict.fromkeys(notes)),
         model=repaired,
         recording=processed.source,

@@ -8,9 +8,13 @@ from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.relatives import Unnamed
+from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
 
 FEW_PERIODS = 10
+
+STANDS_LONG = 0.1
+"""Share of the samples of a joint that are not compared from which on a user is warned; usual are 2 to 6 % [-]."""
 
 DISAGREES = 1e-3
 """Probability of the lack of fit by noise below which model and data are said to disagree."""
@@ -34,6 +38,7 @@ class Facts:
         kind: what data were held out, None where none were.
         nameless: what explains the recording better in the place of an effect that was found, and has no name.
         sound: whether the recording allows a conclusion; warnings say why where it does not.
+        standing: what is not compared beside reversals, at the joint where that is most.
     """
 
     verdict: Verdict
@@ -49,6 +54,7 @@ class Facts:
     kind: Kind | None = None
     nameless: tuple[Unnamed, ...] = ()
     sound: bool = True
+    standing: Standing | None = None
 
 
 def paragraph(facts: Facts) -> str:
@@ -64,6 +70,8 @@ def paragraph(facts: Facts) -> str:
                 parts.append(_held_sentence(facts))
     if facts.remainder > 0.0:
         parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
+    if facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
+        parts.append(f"{_not_compared(facts, facts.standing)}.")
     if facts.verdict is Verdict.SUSPECT:
         parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
     return " ".join(parts)
@@ -128,9 +136,21 @@ def reservations(facts: Facts) -> list[str]:
         )
     elif facts.missing and facts.kind is None:
         found.append("no held-out motion was given: what is named was not tested on another motion")
+    if facts.standing is not None and facts.standing.share > STANDS_LONG:
+        found.append(f"{_not_compared(facts, facts.standing)}. Let the joint pass zero velocity faster")
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")
     return found
+
+
+def _not_compared(facts: Facts, standing: Standing) -> str:
+    """Which samples are not compared, and what could hide there."""
+    speed = facts.units[standing.joint].replace("N m", "rad/s").replace("N", "m/s")
+    return (
+        f"Beside reversals {standing.share:.1%} of the samples of {standing.joint} are not compared (up to "
+        f"{standing.speed:.2g} {speed}; no joint has more): friction that acts only there, stiction or presliding, "
+        "cannot be excluded"
+    )
 
 
 def _percent(share: float) -> str:

@@ -3,11 +3,16 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column, Shape, Side, State
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.effects.spring import deflections
 from sea_ident.robot import Robot
+
+WIDER = 3.0
+"""How many times farther the second element bends before it slips."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,11 @@ class SpringHysteresis(MemoryEffect):
         """Widths within the deflections of this motion."""
         return tuple(replace(self, slip=width) for width in deflections(state, self.required_joint, 40))
 
+    @property
+    def slips(self) -> FloatArray:
+        """(2,) deflection at which each element slips [rad] or [m]."""
+        return self.slip * np.array([1.0, WIDER])
+
     def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Theta - q."""
         return theta - q
@@ -53,7 +63,7 @@ class SpringHysteresis(MemoryEffect):
     def advance(self, memory: tuple[float, ...], distance: float) -> tuple[float, ...]:
         """Both elements stick until they slip."""
         step = distance / self.slip
-        narrow, wide = memory[0] + step, memory[1] + step / 3.0
+        narrow, wide = memory[0] + step, memory[1] + step / WIDER
         return (
             1.0 if narrow > 1.0 else -1.0 if narrow < -1.0 else narrow,
             1.0 if wide > 1.0 else -1.0 if wide < -1.0 else wide,

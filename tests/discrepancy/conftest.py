@@ -14,7 +14,7 @@ from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.motion import FourierSeries
 from sea_ident.robot import Robot
-from sea_ident.simulation import PlantedEffect, simulate
+from sea_ident.simulation import FrictionJitter, PlantedEffect, simulate
 
 PERIOD = 5.0
 
@@ -72,6 +72,12 @@ def nothing_missing(laboratory):
     """Bench and settled model of a leg that has what the model has."""
     bench = laboratory.bench(laboratory.record())
     return bench, settle(bench, bench.effects)
+
+
+@pytest.fixture(scope="session")
+def jittery(laboratory):
+    """Twelve periods of a leg whose friction differs from pass to pass where it is slow."""
+    return laboratory.data(laboratory.record(periods=12, jitter=FrictionJitter(0.1, 0.05)))
 
 
 @pytest.fixture(scope="session")

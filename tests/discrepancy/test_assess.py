@@ -1,11 +1,12 @@
 """What else an effect could be: what gives the same torque is declared, what does not is not, however it is written."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.assess import rivals, transfer
+from sea_ident.discrepancy.assess import no_worse, rivals, transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
@@ -121,3 +122,17 @@ def test_a_shape_that_the_first_motion_leaves_open_is_taken_as_the_other_has_it(
     chosen, _, held = decide(bench, wide, {first: (), first + 1: ()}, before)
     assert chosen.effects[0].half_width < 0.005
     assert held.transfers[0].statistic < before.transfers[0].statistic - 50.0
+
+
+@pytest.mark.parametrize(
+    ("statistic", "gain", "difference"),
+    [
+        (600.0, 1e5, 13.8),  # right: the odds of a thousand
+        (1200.0, 1e5, 2 * 13.8),  # nearly right: in units of what is left
+        (3600.0, 1e6, 0.5 * 3000.0),  # nearly all, in a form that is not right: half of what it leaves
+        (3600.0, 1e4, 6 * 13.8),  # not nearly all: nothing is said of its form
+    ],
+)
+def test_where_no_form_is_right_what_leaves_little_more_is_no_worse(statistic, gain, difference):
+    fit = SimpleNamespace(statistic=statistic, dof=600, excess=max(statistic - 600.0, 0.0))
+    assert no_worse(fit, gain) == pytest.approx(difference)

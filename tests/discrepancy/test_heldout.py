@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.heldout import Kind, held_out, other_periods
+from sea_ident.discrepancy.heldout import Kind, held_out, other_periods, tried, without_history
 from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.effects import make_effect
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +96,30 @@ def test_one_pass_tests_nothing_and_it_is_said(laboratory, ripple):
     found, warnings = held_out(*ripple, laboratory.record(periods=1, motion=1))
     assert found.kind is Kind.OTHER_PERIODS
     assert "less than two periods" in warnings[0]
+
+
+def test_a_constant_torque_of_a_spring_that_remembers_does_not_count(ripple):
+    bench, selection = ripple
+    fit = bench.predicted(selection.start.fit.effects, selection.start.fit.parameters)
+    constant = bench.column_spectra(make_effect("spring_offset", "hip"), fit.effects)[:, :, 0]
+    loaded = replace(fit, residual=fit.residual + 3.0 * constant)
+    assert without_history(bench, fit, []) is fit
+    cleaned, other = (without_history(bench, each, ["hip"]).residual for each in (fit, loaded))
+    np.testing.assert_allclose(other, cleaned, atol=1e-9)
+    touched = [e.joint == "hip" for e in bench.data.equations]
+    np.testing.assert_array_equal(cleaned[:, ~np.array(touched)], fit.residual[:, ~np.array(touched)])
+    # only the mean goes, and of it what both equations of the joint share
+    np.testing.assert_allclose(cleaned[1:], fit.residual[1:], atol=1e-9)
+    assert abs(np.vdot(constant[0], cleaned[0])) < 1e-9
+
+
+def test_that_constant_is_left_out_for_springs_with_dry_friction_alone(ripple):
+    bench, selection = ripple
+    start = selection.start.fit
+    means = {}
+    for name in ("spring_hysteresis", "torque_offset"):
+        fit = bench.fit((*start.effects, make_effect(name, "hip")), selection.start.noise, start=start.parameters)
+        found = tried(bench, replace(selection, final=Settled(fit, selection.start.noise)), "the same")
+        predicted = bench.predicted(fit.effects, fit.parameters)
+        means[name] = np.array_equal(found.after.residual, predicted.residual)
+    assert means == {"spring_hysteresis": False, "torque_offset": True}

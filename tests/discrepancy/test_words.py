@@ -7,6 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
+from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph, reservations
 from sea_ident.effects import make_effect
@@ -80,3 +81,15 @@ def test_what_was_held_out_is_said_and_how_far_it_can_be_trusted(kind, where, re
     assert ("held out" in paragraph(told)) is (kind is not None)
     found = reservations(told)
     assert found == [] if reservation is None else len(found) == 1 and reservation in found[0]
+
+
+@pytest.mark.parametrize(("unit", "speed"), [("N m", "0.003 rad/s"), ("N", "0.003 m/s")])
+def test_what_is_not_compared_is_said_where_nothing_is_missing_and_warned_of_where_it_is_much(unit, speed):
+    nothing = replace(facts(Verdict.NONE, p_value=0.5), missing=(), units={"hip": unit})
+    little, much = (replace(nothing, standing=Standing("hip", share, 0.003)) for share in (0.021, 0.21))
+    assert f"2.1% of the samples of hip are not compared (up to {speed};" in paragraph(little)
+    assert "stiction or presliding, cannot be excluded." in paragraph(little)
+    assert reservations(little) == []
+    assert [text[:23] for text in reservations(much)] == ["Beside reversals 21.0% "]
+    assert "not compared" not in paragraph(replace(much, verdict=Verdict.NAMED))
+    assert "not compared" not in paragraph(replace(nothing, standing=Standing("hip", 0.0, 0.0)))

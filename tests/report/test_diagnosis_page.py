@@ -85,6 +85,9 @@ def diagnosis() -> Diagnosis:
         detectability=(
             Detectability("backlash", "hip", 0.002, "rad", 0.3, ("spring_offset at hip", "asymmetric_spring")),
             Detectability("base_tilt", None, float("inf"), "rad", 1.0, ("encoder_offset",)),
+            Detectability(
+                "stribeck_friction", "hip", 0.15, "N m", 0.9, (), (("speed", 0.1, "rad/s"), ("exponent", 2.0, "-"))
+            ),
         ),
         next_experiment=NextExperiment(("stribeck_friction at knee", "nonlinear_viscous_friction at knee"), {}, 2.6),
         warnings=("only 12 periods",),
@@ -116,6 +119,7 @@ def test_the_page_says_verdict_gap_effect_and_alternatives(diagnosis, tmp_path):
     # held out: 1 - 0.06 / 0.3
     assert "80 % of the gap closed on held-out data" in text
     assert "2.6 times better" in text
+    assert "stribeck_friction (speed 0.1 rad/s, exponent 2) hip 0.15 N m 90" in text
     assert "backlash hip 0.002 rad 30 spring_offset at hip, asymmetric_spring" in text
     assert "0.1 % of the torque: an unmodelled remainder" in text
 

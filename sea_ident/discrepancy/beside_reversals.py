@@ -1,0 +1,70 @@
+"""Friction that acts only beside reversals, in samples that a search leaves out: those are compared, for it alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import candidate_effects, scan
+from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
+from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import torque_changes
+from sea_ident.discrepancy.search import BESIDE_ANOTHER, MOST_EFFECTS, SMALLEST_SHARE, next_effect
+from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
+
+USUAL = 1
+"""Caution of the recordings that are looked at: one that is diagnosed without its slow samples is not."""
+
+
+def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench, Confirmed]:
+    """Look for friction in the samples beside reversals, where what was found explains all others.
+
+    What the mean leaves there is not noise alone: the corner of friction that a band-limited speed misses, a motor that
+    friction holds. So an effect must explain a share of it as anywhere else, stand out of the scatter of the periods
+    along its own column, and be the best of the whole library.
+
+    Args:
+        bench: the recording.
+        confirmed: what was found in the rest of it.
+
+    Returns:
+        The bench that shows what was found, and what was found with the friction there.
+    """
+    if bench.data.caution != USUAL or bench.data.periods < FEWEST_PERIODS or unexplained(confirmed):
+        return bench, confirmed
+    near = Bench(compared_beside_reversals(bench.data), bench.effects)
+    before = confirmed.selection
+    now = settle_again(near, before.final.fit)
+    added: list[float] = []
+    while before.added + len(added) < MOST_EFFECTS:
+        step = _next(near, now, before.start.fit)
+        if step is None:
+            break
+        added.append(step[1])
+        now = settle_again(near, settle_again(near, step[0]).fit)
+    if not added:
+        return bench, replace(confirmed, beside=(near, now))
+    start = settle_again(near, before.start.fit)
+    candidates = tuple(scan(near, now.fit, now.noise))
+    selection = replace(
+        before, start=start, final=now, added=before.added + len(added), p_values=(*before.p_values, *added),
+        candidates=candidates, tests=max(sum(c.tests for c in candidates), 1),
+    )  # fmt: skip
+    return near, Confirmed(selection, near, start, now, beside=(near, now))
+
+
+def _next(near: Bench, now: Settled, start: Fit) -> tuple[Fit, float] | None:
+    """The friction that acts beside reversals refitted with everything free, and its significance."""
+    change = torque_changes(near, start, now.fit) if len(now.fit.effects) > len(start.effects) else 0.0
+    smallest = np.broadcast_to(np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * change), now.fit.scale.shape)
+    few = [effect for effect in candidate_effects(near, now.fit.effects) if effect.name in LIVE_BESIDE_REVERSALS]
+    step: tuple[Fit, float] | None = None
+    for effects in (few, None):
+        # all others only where one of the few may be it: mostly none is
+        candidates = scan(near, now.fit, now.noise, effects)
+        step = next_effect(near, now, candidates, max(sum(c.tests for c in candidates), 1), smallest)
+        if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:
+            return None
+    return step

@@ -1,0 +1,104 @@
+"""Friction that acts beside reversals only is found there or not, as large as was said that it would have to be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.assess import detectability
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.confirm import confirm
+from sea_ident.discrepancy.heldout import held_out
+from sea_ident.discrepancy.search import Selection, search
+from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.standing import BESIDE_REVERSALS
+
+SIZE, SPEED, EXPONENT = 1.2, 0.03, 1.0
+"""Friction of the knee that is gone where what a search compares begins."""
+
+
+def with_friction(data, size, speed, exponent):
+    """The same passes with more friction of the knee where it is slow: what a sensor of that torque would have seen."""
+    knee = data.robot.index("knee")
+    speeds = np.stack([motion.dtheta[:, knee] for motion in data.period_motions])
+    more = size * np.tanh(speeds / 0.002) * np.exp(-(np.abs(speeds / speed) ** exponent))
+    torque, mean = data.period_tau_motor.copy(), data.tau_motor.copy()
+    torque[:, :, knee] += more
+    mean[:, knee] += more.mean(axis=0)
+    return replace(data, period_tau_motor=torque, tau_motor=mean)
+
+
+def named(selection):
+    return [(effect.name, effect.joint) for effect in selection.effects]
+
+
+def unsearched(bench):
+    """What was found: nothing."""
+    start = settle(bench, bench.effects)
+    return confirm(bench, Selection(start, start, 0, ()))
+
+
+@pytest.fixture(scope="module")
+def sticking(jittery, laboratory):
+    """A knee whose friction is larger where it turns, on the bench that shows it, and what was found."""
+    bench = Bench(with_friction(jittery, SIZE, SPEED, EXPONENT), laboratory.effects)
+    return bench, searched_beside_reversals(bench, unsearched(bench))
+
+
+@pytest.fixture(scope="module")
+def least(jittery, laboratory):
+    """What could be seen of Stribeck friction of the knee where nothing is missing."""
+    bench = Bench(jittery, laboratory.effects)
+    same, confirmed = searched_beside_reversals(bench, unsearched(bench))
+    assert same is bench
+    assert confirmed.selection.added == 0
+    start = confirmed.selection.start
+    found = detectability(bench, start.fit, start.noise, scan(bench, start.fit, start.noise), confirmed.beside)
+    return next(d for d in found if (d.effect, d.joint) == ("stribeck_friction", "knee"))
+
+
+def test_a_search_and_its_confirmation_do_not_see_what_acts_beside_reversals_only(sticking):
+    bench, _ = sticking
+    assert named(confirm(bench, search(bench, bench.effects)).selection) == []
+
+
+def test_the_samples_beside_reversals_show_it(sticking):
+    bench, (near, confirmed) = sticking
+    assert named(confirmed.selection) == [("stribeck_friction", "knee")]
+    assert confirmed.selection.p_values[0] < 1e-6
+    assert near is confirmed.bench is confirmed.beside[0]
+    assert near.data.caution == BESIDE_REVERSALS
+    assert np.mean(near.data.left_out) < np.mean(bench.data.left_out)
+    fit = confirmed.final.fit
+    effect, size = fit.effects[-1], fit.parameters["knee.stribeck_friction"]
+    for speed in (0.02, 0.04):
+        truth = SIZE * np.exp(-((speed / SPEED) ** EXPONENT))
+        assert size * np.exp(-((speed / effect.speed) ** effect.exponent)) == pytest.approx(truth, rel=0.2)
+
+
+def test_another_motion_is_compared_beside_its_reversals_too(sticking, laboratory):
+    _, (near, confirmed) = sticking
+    held, _ = held_out(near, confirmed.selection, laboratory.record(periods=2, motion=1))
+    assert held.other_motion
+    assert held.bench.data.caution == BESIDE_REVERSALS
+
+
+def test_fewer_than_ten_periods_are_not_looked_at(nothing_missing):
+    bench, start = nothing_missing
+    confirmed = confirm(bench, Selection(start, start, 0, ()))
+    assert searched_beside_reversals(bench, confirmed) == (bench, confirmed)
+    assert confirmed.beside is None
+
+
+def test_what_is_said_to_be_the_smallest_belongs_to_a_shape(least):
+    assert least.shapes == (("speed", 0.1, "rad/s"), ("exponent", 2.0, "-"))
+
+
+@pytest.mark.parametrize(("times", "seen"), [(0.4, []), (2.0, [("stribeck_friction", "knee")])])
+def test_friction_smaller_than_the_smallest_is_not_seen_and_larger_is(jittery, laboratory, least, times, seen):
+    shapes = (value for _, value, _ in least.shapes)
+    bench = Bench(with_friction(jittery, times * least.smallest, *shapes), laboratory.effects)
+    _, confirmed = searched_beside_reversals(bench, confirm(bench, search(bench, bench.effects)))
+    assert named(confirmed.selection) == seen

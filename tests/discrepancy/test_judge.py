@@ -1,0 +1,51 @@
+"""What speaks against an effect."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.diagnose import _out
+from sea_ident.discrepancy.judge import dissipates, physical
+from sea_ident.effects import make_effect
+
+
+@pytest.mark.parametrize("element", [0, 1])
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
+def test_a_spring_with_dry_friction_is_one_where_it_takes_energy_out(nothing_missing, element, share):
+    bench, start = nothing_missing
+    motion, hip = bench.data.motion, bench.robot.index("hip")
+    effect = make_effect("spring_hysteresis", "hip", slip=share * float(np.ptp(motion.deflection[:, hip])))
+    torque = effect.evaluate(bench.state(start.fit.effects)).motor[:, hip, element]
+    speed = (motion.dtheta - motion.dq)[:, hip]
+    # elastic torque takes nothing, but for the rounding of a sum over samples
+    taken = float(np.mean(torque * speed)) / float(np.mean(np.abs(speed)))
+    assert dissipates(bench, effect, np.eye(2)[element]) == (taken > 0.01)
+
+
+def test_a_spring_that_takes_next_to_no_energy_out_is_not_accepted(nothing_missing):
+    bench, start = nothing_missing
+    # the first element slips to and fro, the second does not
+    effect = make_effect("spring_hysteresis", "hip", slip=0.3 * float(np.ptp(bench.data.motion.deflection[:, 0])))
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    for narrow, accepted in ((0.05, False), (0.3, True)):
+        values = fit.values.copy()
+        values[-2:] = narrow, 1.0
+        assert physical(bench, replace(fit, values=values), -1) == accepted
+    assert dissipates(bench, make_effect("torque_offset", "hip"), np.ones(1))
+
+
+@pytest.mark.parametrize(
+    ("shares", "drifting", "out"),
+    [
+        ([0.9, 0.8], 0, []),
+        ([0.9, 0.2, -1.0], 0, [1, 2]),  # the form of what holds
+        ([0.15, -2.5, -0.4], 0, [1]),  # nothing holds: the worst spoils the others
+        ([0.15, -0.4], 1, [0, 1]),  # what drifts is left
+        ([-0.4], 0, []),  # nothing would be left
+    ],
+)
+def test_what_does_not_hold_goes_and_where_nothing_holds_the_worst(shares, drifting, out):
+    transfers = [SimpleNamespace(share=share, holds=share > 0.5) for share in shares]
+    assert _out(SimpleNamespace(transfers=transfers), drifting) == out
