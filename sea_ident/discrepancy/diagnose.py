@@ -37,8 +37,10 @@ from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation import Controller
 
-FEWEST_TO_SEARCH = 3
-"""Periods below which no finer effect is looked for: one difference of two periods is no noise floor."""
+FEWEST_TO_SEARCH = 4
+"""Periods below which no finer effect is looked for: how they scatter along what it does cannot be told.
+
+Of three periods with nothing missing a fifth got a name."""
 
 Progress = Callable[[str, float], None]
 

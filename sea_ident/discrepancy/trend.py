@@ -14,7 +14,7 @@ from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
 from sea_ident.discrepancy.trend_directions import Direction, Name, PeriodColumns, courses, steady_rows
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
-from sea_ident.discrepancy.trend_search import PRICE_OF_A_BEND, Chosen, alike, best_trend, find_trends
+from sea_ident.discrepancy.trend_search import Chosen, alike, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import Course, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
@@ -292,9 +292,6 @@ def _trend(
         if other.name in taken:
             continue
         amount = gain(numbers, other, held)[0]
-        uncaused = direction.effect.name, other.name == ("friction_drift", direction.effect.joint)
-        if uncaused == ("temperature_friction", True) and amount < own.gain + PRICE_OF_A_BEND:
-            continue  # the same without its cause: a measured temperature says more than any time that does no better
         if own.gain - amount < EQUALLY_GOOD:
             share = alike(numbers, direction, other, held)
             if share > alternatives.get(other.name, (other.effect, 0.0))[1]:

@@ -122,6 +122,14 @@ def reservations(facts: Facts, held_out: bool) -> list[str]:
         )
     elif facts.missing and not held_out:
         found.append("no held-out motion was given: what is named was not tested on another motion")
+    if any(
+        {m.effect, *(a.effect for a in m.alternatives)} >= {"temperature_friction", "friction_drift"}
+        for m in facts.missing
+    ):
+        found.append(
+            "the temperature goes the way that a drift goes by itself: whether friction follows it or the time is not "
+            "told. Record the same once more while it goes another way, as in cooling down"
+        )
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")
     return found
@@ -138,6 +146,11 @@ def _name(m: MissingEffect) -> str:
 
 def _better(one: Unnamed) -> str:
     """What a nameless relative of an effect explains."""
+    if one.second is not None:
+        return (
+            f"{one.effect} and {one.second} at {one.joint} are what one effect alone does as well: "
+            f"{one.relative}, with a parameter less."
+        )
     share = f"{100 * one.share:.2g} %"
     return f"The same as {one.effect} at {one.joint}, but {one.relative}, leaves {share} of what that one leaves."
 

@@ -108,8 +108,14 @@ def test_every_verdict_follows_from_findings():
     effect = MissingEffect("torque_ripple", "hip", (), 0.05, 1e-9, ())
     other = replace(effect, alternatives=(Alternative("torque_offset", "hip", 1.0),))
 
-    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True):
-        return verdict_of(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal), holds)
+    class Drifts(Trends):
+        trends = (object(),)
+
+    class LeavesAnother(Drifts):
+        unnamed = True
+
+    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True, trends=Trends):
+        return verdict_of(Bench(), missing, trends(), None, remainder, unexplained, Findings((), fatal), holds)
 
     assert verdict([]) is Verdict.NONE
     assert verdict([effect]) is Verdict.NAMED
@@ -117,6 +123,9 @@ def test_every_verdict_follows_from_findings():
     assert verdict([effect], remainder=0.011) is Verdict.NOT_IN_LIBRARY
     assert verdict([replace(effect, effect="coulomb_friction")], remainder=0.011) is Verdict.NAMED_WITH_REMAINDER
     assert verdict([effect], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
+    # what drifts is in the mean too, but not where the periods show more than what was named
+    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=LeavesAnother) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
     assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
     assert verdict([effect], holds=False) is Verdict.SUSPECT
