@@ -128,7 +128,7 @@ def noise_directions(periods: FloatArray) -> float:
     gram = steps @ steps.T
     apart = gram[np.triu_indices(len(steps), 2)]
     if len(apart) < FEWEST_STEPS:
-        return FILLED * periods.shape[1]
+        return FILLED * float(periods.shape[1])
     return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2)), 1e-300))
 
 

@@ -92,7 +92,7 @@ def test_torque_of_one_joint_in_the_signal_of_another(nothing_missing):
 
 
 def test_two_effects_that_are_one_in_one_direction(nothing_missing):
-    """A fifth of the load is lost while the motor drives: half of it looks like friction, half like a torque constant."""
+    """A fifth of the load is lost where the motor drives: half looks like friction, half like a torque constant."""
     bench, start = nothing_missing
     loss = bench.anchored((*start.fit.effects, make_effect("directional_efficiency", "knee")), start.fit.parameters)[-1]
     bench = with_torque(bench, (KNEE, 0.2 * loss.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0]))
