@@ -20,6 +20,7 @@ from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
+from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.relatives import unnamed
@@ -36,11 +37,6 @@ from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation import Controller
-
-FEWEST_TO_SEARCH = 4
-"""Periods below which no finer effect is looked for: how they scatter along what it does cannot be told.
-
-Of three periods with nothing missing a fifth got a name."""
 
 Progress = Callable[[str, float], None]
 

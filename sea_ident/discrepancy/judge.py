@@ -19,6 +19,11 @@ LARGEST_TIMES_TORQUE = 1.5
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
 
+FEWEST_TO_SEARCH = 4
+"""Periods below which it cannot be told how they scatter along what an effect does: then none is looked for.
+
+Of three periods with nothing missing a fifth got a name."""
+
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
 
@@ -71,7 +76,7 @@ def scatter_p(periods: FloatArray, change: FloatArray) -> float:
         Probability by Student's t; 0 where there are too few periods to tell.
     """
     count = len(periods)
-    if count < 4:
+    if count < FEWEST_TO_SEARCH:
         return 0.0
     along = periods @ change / np.linalg.norm(change)
     spread = float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / count))

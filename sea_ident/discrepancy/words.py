@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.trend import TrendTest
@@ -110,7 +111,12 @@ def _held_sentence(facts: Facts) -> str:
 def reservations(facts: Facts, held_out: bool) -> list[str]:
     """What to know before trusting the diagnosis."""
     found = []
-    if facts.periods < FEW_PERIODS:
+    if facts.periods < FEWEST_TO_SEARCH:
+        found.append(
+            f"{facts.periods} periods only: how they scatter along what an effect does cannot be told, and nothing "
+            f"finer than friction that the model does not have at all was looked for; record {FEW_PERIODS} or more"
+        )
+    elif facts.periods < FEW_PERIODS:
         found.append(
             f"{facts.periods} periods only: the noise floor is uncertain and small effects are not told from it; "
             f"record {FEW_PERIODS} or more"

@@ -94,6 +94,15 @@ def test_cannot_tell_from_one_pass(leg, series, model):
     assert quietly(model, motion).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
 
 
+def test_of_three_periods_nothing_fine_is_named(leg, series):
+    """What is missing shows in them, but not how they scatter along it."""
+    recording = recorded(leg, series[0], [named("torque_ripple", "hip", [1.0, 0.5], order=4.0)], periods=3)
+    found = quietly(identified(leg, recording), recording)
+    assert found.lack_of_fit.p_value < 1e-3
+    assert (found.verdict, found.missing) == (Verdict.CANNOT_TELL, ())
+    assert any("nothing finer than" in text for text in found.warnings)
+
+
 def test_every_verdict_follows_from_findings():
     class Data:
         periods = 20
