@@ -16,6 +16,7 @@ from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.drifting import drifting
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
@@ -23,7 +24,7 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out, tried
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
-from sea_ident.discrepancy.relatives import unnamed
+from sea_ident.discrepancy.relatives import Unnamed, unnamed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
@@ -116,7 +117,10 @@ def diagnose(
     tell("testing on held-out data", 0.75)
     confirmed, alternatives, held, held_notes = _tested(bench, confirmed, alternatives, trends, holdout)
     selection = confirmed.selection
-    nameless = unnamed(bench, selection, held) if basic is None else ()
+    nameless: tuple[Unnamed, ...] = ()
+    if basic is None:
+        drifts = drifting(confirmed.bench, confirmed.final, trends.trends, temperature)
+        nameless = (*unnamed(bench, selection, held), *drifts)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)

@@ -109,6 +109,19 @@ class Unnamed:
     fit: Fit
     second: str | None = None
 
+    @property
+    def sentence(self) -> str:
+        """What it explains."""
+        if self.second is not None:
+            return (
+                f"{self.effect} and {self.second} at {self.joint} are what one effect alone does as well: "
+                f"{self.relative}, with a parameter less."
+            )
+        share = f"{100 * self.share:.2g} %"
+        return (
+            f"The same as {self.effect} at {self.joint}, but {self.relative}, leaves {share} of what that one leaves."
+        )
+
 
 @dataclass(frozen=True)
 class Relative(Effect):

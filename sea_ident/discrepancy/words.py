@@ -150,17 +150,6 @@ def _name(m: MissingEffect) -> str:
     return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
 
 
-def _better(one: Unnamed) -> str:
-    """What a nameless relative of an effect explains."""
-    if one.second is not None:
-        return (
-            f"{one.effect} and {one.second} at {one.joint} are what one effect alone does as well: "
-            f"{one.relative}, with a parameter less."
-        )
-    share = f"{100 * one.share:.2g} %"
-    return f"The same as {one.effect} at {one.joint}, but {one.relative}, leaves {share} of what that one leaves."
-
-
 def _opening(facts: Facts) -> str:
     names = ", ".join(f"{_name(m)} ({m.extent})" for m in facts.missing)
     match facts.verdict:
@@ -187,7 +176,7 @@ def _opening(facts: Facts) -> str:
             return f"Something is missing; it looks like {names}, but that does not hold on other data."
         case Verdict.NOT_IN_LIBRARY:
             near = f" The nearest is {names}, which is no full explanation." if names else ""
-            better = "".join(f" {_better(relative)}" for relative in facts.nameless)
+            better = "".join(f" {relative.sentence}" for relative in facts.nameless)
             return f"Something is missing that is not in the library.{near}{better}"
         case Verdict.ONLY_AGAINST_REFERENCE:
             return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."
