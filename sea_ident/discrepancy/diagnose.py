@@ -119,7 +119,7 @@ def diagnose(
     selection = confirmed.selection
     nameless: tuple[Unnamed, ...] = ()
     if basic is None:
-        drifts = drifting(confirmed.bench, confirmed.final, trends.trends, temperature)
+        drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
         nameless = (*unnamed(bench, selection, held), *drifts)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)

@@ -12,13 +12,12 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import flat_periods
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.settle import Settled
-from sea_ident.discrepancy.trend import EQUALLY_GOOD, Trend
+from sea_ident.discrepancy.trend import EQUALLY_GOOD, UNEXPLAINED, Trend, TrendTest, trend_excess
 from sea_ident.discrepancy.trend_directions import Cause, Direction, PeriodColumns, courses
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.effects import Column, Contribution, Effect, Side, State
@@ -67,16 +66,16 @@ class UnnamedDrift(Unnamed):
     @property
     def sentence(self) -> str:
         """What it explains."""
-        return (
-            f"That the {self.relative} at {self.joint} drifts explains what changes from period to period better than "
-            f"{self.effect} does."
-        )
+        what = f"That the {self.relative} at {self.joint} drifts explains what changes from period to period"
+        return f"{what}." if self.effect == self.relative else f"{what} better than {self.effect} does."
 
 
 def drifting(
-    bench: Bench, now: Settled, trends: Sequence[Trend], temperature: FloatArray | None = None
+    bench: Bench, now: Settled, trends: TrendTest, temperature: FloatArray | None = None
 ) -> tuple[UnnamedDrift, ...]:
     """Trends in the place of which the drift of an effect that was found at their joint explains much more.
+
+    Where what changes has no name, the drift of an effect that was found must explain most of it.
 
     Args:
         bench: the recording.
@@ -88,59 +87,66 @@ def drifting(
         One entry for every such trend.
     """
     fit, found = now.fit, []
-    for k, trend in enumerate(trends):
-        others = [t for i, t in enumerate(trends) if i != k]
-        own = _at_the_joint(bench, fit, trend)
+    mean = [e for e in fit.effects[len(bench.effects) :] if e.columns(bench.robot)]
+    sized = [e for e in mean if e.joint is not None and not is_signal(e) and not isinstance(e, ExternalForce)]
+    for k, trend in enumerate(trends.trends):
+        others = [t for i, t in enumerate(trends.trends) if i != k]
+        own = [e for e in sized if e.joint == trend.effect.joint]
         if not own:
             continue
-        gains = _gains(bench, now, trend, others, own, temperature)
-        best = int(np.argmax(gains[1:]))
-        if gains[1 + best] - gains[0] > EQUALLY_GOOD:
+        first, *gains = _Drifts(bench, now, temperature, own).gains(trend, others)
+        best = int(np.argmax(gains))
+        if gains[best] - first > EQUALLY_GOOD:
             found.append(UnnamedDrift(trend.effect.name, trend.effect.joint, own[best].name, 0.0, fit))
+    if trends.unnamed and not trends.trends and sized:
+        drifts = _Drifts(bench, now, temperature, sized)
+        _, *gains = drifts.gains()
+        best = int(np.argmax(gains))
+        if gains[best] > max(UNEXPLAINED * drifts.excess, EQUALLY_GOOD):
+            found.append(UnnamedDrift(sized[best].name, sized[best].joint, sized[best].name, 0.0, fit))
     return tuple(found)
 
 
-def _at_the_joint(bench: Bench, fit: Fit, trend: Trend) -> list[Effect]:
-    """Effects that were found at the joint of a trend and have a size that could drift."""
-    found = fit.effects[len(bench.effects) :]
-    here = [e for e in found if e.joint == trend.effect.joint and not is_signal(e) and not isinstance(e, ExternalForce)]
-    return [e for e in here if e.columns(bench.robot)]
+class _Drifts:
+    """Drifts of effects and the trends of the library, all in one scatter of the periods.
 
+    Args:
+        bench: the recording.
+        now: the model and its noise floor.
+        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+        effects: what may drift.
 
-def _gains(
-    bench: Bench,
-    now: Settled,
-    trend: Trend,
-    others: Sequence[Trend],
-    effects: Sequence[Effect],
-    temperature: FloatArray | None,
-) -> list[float]:
-    """Drop of the statistic by a trend and by the drift of each effect in its place, all in one scatter."""
-    periods, fit = bench.data.periods, now.fit
-    flat = flat_periods(bench, now) / np.sqrt(periods)
-    flat -= flat.mean(axis=0)
-    middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
-    whitener, free = bench.whitener(now.noise) / np.sqrt(periods), bench.free_basis(now.noise)
-    known = PeriodColumns(bench, fit, whitener, free).causes(temperature)
-    relatives = []
-    for effect in effects:
-        drift = Drifting(effect.joint, effect=effect)
-        spectra = bench.spectra_of(drift.steady(bench.state(fit.effects)), fit.effects) * fit.scale[:, None]
-        relatives.append(Cause(drift, off(free, whiten(whitener, spectra)), None))
-    space = column_space([*known, *relatives])
-    numbers = flat @ space
-    scatter = scatter_whitener(numbers, middle)
-    numbers = numbers @ scatter
+    Attributes:
+        excess: what the linear trend in everything is beyond the scatter of the periods.
+    """
 
-    def directions(cause: Cause) -> list[Direction]:
-        columns = scatter @ (space.T @ cause.columns)
-        return courses(cause, np.broadcast_to(columns, (periods, *columns.shape)), middle)
+    def __init__(self, bench: Bench, now: Settled, temperature: FloatArray | None, effects: Sequence[Effect]) -> None:
+        periods, fit = bench.data.periods, now.fit
+        flat = flat_periods(bench, now) / np.sqrt(periods)
+        flat -= flat.mean(axis=0)
+        self._middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
+        self.excess = trend_excess(flat, self._middle)
+        whitener, free = bench.whitener(now.noise) / np.sqrt(periods), bench.free_basis(now.noise)
+        known = PeriodColumns(bench, fit, whitener, free).causes(temperature)
+        self._known = {cause.name: cause for cause in known}
+        self._drifts = []
+        for effect in effects:
+            drift = Drifting(effect.joint, effect=effect)
+            spectra = bench.spectra_of(drift.steady(bench.state(fit.effects)), fit.effects) * fit.scale[:, None]
+            self._drifts.append(Cause(drift, off(free, whiten(whitener, spectra)), None))
+        self._space = column_space([*known, *self._drifts])
+        numbers = flat @ self._space
+        self._scatter = scatter_whitener(numbers, self._middle)
+        self._numbers = numbers @ self._scatter
 
-    def best(cause: Cause, held: FloatArray | None = None) -> tuple[float, Direction]:
-        return max(((gain(numbers, d, held)[0], d) for d in directions(cause)), key=lambda item: item[0])
+    def gains(self, trend: Trend | None = None, others: Sequence[Trend] = ()) -> list[float]:
+        """Drop of the statistic by a trend (0 without one), and by each drift in its place, beside other trends."""
+        beside = [self._known[t.effect.name, t.effect.joint] for t in others]
+        held = held_basis([self._best(cause)[1] for cause in beside])
+        first = 0.0 if trend is None else self._best(self._known[trend.effect.name, trend.effect.joint], held)[0]
+        return [first, *(self._best(cause, held)[0] for cause in self._drifts)]
 
-    causes = {cause.name: cause for cause in known}
-    beside = [causes[t.effect.name, t.effect.joint] for t in others]
-    held = held_basis([best(cause)[1] for cause in beside])
-    mine = causes[trend.effect.name, trend.effect.joint]
-    return [best(cause, held)[0] for cause in (mine, *relatives)]
+    def _best(self, cause: Cause, held: FloatArray | None = None) -> tuple[float, Direction]:
+        columns = self._scatter @ (self._space.T @ cause.columns)
+        every = courses(cause, np.broadcast_to(columns, (len(self._numbers), *columns.shape)), self._middle)
+        return max(((gain(self._numbers, d, held)[0], d) for d in every), key=lambda item: item[0])

@@ -265,6 +265,9 @@ def _one_for_two(bench: Bench, selection: Selection, held: HeldOut | None) -> tu
             # the load is that of the model with both: without them it bends
             relative = bench.anchored((*others, candidate.effect), fit.parameters)[-1]
             new = refitted(bench, others, relative, (), noise, fit.parameters)
+            if new.statistic - fit.statistic > EQUALLY_GOOD * unit:
+                # the shapes of the model are those beside the two
+                new = bench.refine(new.effects, noise, start=new.parameters)
             if new.statistic - fit.statistic < EQUALLY_GOOD * unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
                 found.append(Unnamed(own.name, own.joint, _in_words(candidate), share, new, second.name))

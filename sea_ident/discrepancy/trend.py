@@ -164,10 +164,10 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     left = flat if held is None else off(held, flat.ravel()).reshape(flat.shape)
     unnamed = _omnibus(left, middle, noise) < LEVEL
     if unnamed and chosen:
-        unexplained = _excess(left, middle)
+        unexplained = trend_excess(left, middle)
         if len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
             chosen = find_trends(numbers, directions, middle, noise, 1, LEVEL, matters)
-        if unexplained > UNEXPLAINED * _excess(flat, middle):
+        if unexplained > UNEXPLAINED * trend_excess(flat, middle):
             chosen = []
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
@@ -233,7 +233,7 @@ def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(flat))))
 
 
-def _excess(flat: FloatArray, middle: FloatArray) -> float:
+def trend_excess(flat: FloatArray, middle: FloatArray) -> float:
     """What the linear trend in everything is beyond the scatter of the periods."""
     profile = middle - middle.mean()
     along = profile @ flat / np.linalg.norm(profile)
