@@ -30,7 +30,7 @@ def without_drift_of_torque(monkeypatch):
 
 
 def test_a_torque_constant_that_drifts_is_no_friction_that_does(laboratory, without_drift_of_torque):
-    planted = [("torque_constant_drift", "knee", [-0.15], {})]
+    planted = [("torque_constant_drift", "knee", [-0.4], {})]
     bench, start, now, trends = compared(laboratory, planted, ("torque_constant", "knee"))
     # something changes, and whether it got the nearest name or none hangs on how much that leaves
     assert trends.p_value < 1e-3
@@ -50,7 +50,7 @@ def test_a_torque_constant_that_drifts_is_no_friction_that_does(laboratory, with
     ("drift", "found"),
     [
         (("friction_drift", "knee", [0.0, -0.6], {}), ("torque_constant", "knee")),
-        (("torque_constant_drift", "knee", [-0.15], {}), ("torque_constant", "knee")),
+        (("torque_constant_drift", "knee", [-0.4], {}), ("torque_constant", "knee")),
     ],
 )
 def test_a_drift_of_the_library_keeps_its_name_beside_what_was_found(laboratory, drift, found):
