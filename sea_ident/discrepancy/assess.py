@@ -14,7 +14,7 @@ from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.judge import (
     EQUALLY_GOOD,
-    FEWEST_TO_SCATTER,
+    FEWEST_TO_SEARCH,
     flat_periods,
     penalty,
     physical,
@@ -298,7 +298,7 @@ def _beside_reversals(
     if not strength**2 > ABSORBED * power:
         return float("inf"), 1.0
     size = _needed(1, tests, settled.noise)
-    if len(periods) >= FEWEST_TO_SCATTER:
+    if len(periods) >= FEWEST_TO_SEARCH:
         least = float(stats.t.isf(SCATTER_LEVEL / 2.0, step_freedom(len(periods))))
         size = max(size, (least + POWER_QUANTILE) * spread(periods, across))
     return size / strength, 1.0 - strength**2 / power

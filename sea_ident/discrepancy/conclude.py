@@ -226,7 +226,9 @@ def verdict_of(
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
     nameless = remainder > WORTH_A_NAME and not all(m.effect in BASIC for m in structural)
-    if large and (unexplained > UNEXPLAINED or nameless) and not trends.trends:
+    # what drifts is in the mean too, where all that changes is known
+    drifts = bool(trends.trends) and not trends.unnamed
+    if large and (unexplained > UNEXPLAINED or nameless) and not drifts:
         return Verdict.NOT_IN_LIBRARY
     if any(m.alternatives for m in structural):
         return Verdict.AMBIGUOUS

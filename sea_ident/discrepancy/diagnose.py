@@ -17,13 +17,15 @@ from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.drifting import drifting
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out
+from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
-from sea_ident.discrepancy.relatives import unnamed
+from sea_ident.discrepancy.relatives import Unnamed, unnamed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
@@ -37,9 +39,6 @@ from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation import Controller
-
-FEWEST_TO_SEARCH = 3
-"""Periods below which no finer effect is looked for: one difference of two periods is no noise floor."""
 
 Progress = Callable[[str, float], None]
 
@@ -119,7 +118,10 @@ def diagnose(
     tell("testing on held-out data", 0.75)
     confirmed, alternatives, held, held_notes = _tested(bench, confirmed, alternatives, trends, holdout)
     selection = confirmed.selection
-    nameless = unnamed(bench, selection, held) if basic is None else ()
+    nameless: tuple[Unnamed, ...] = ()
+    if basic is None:
+        drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
+        nameless = (*unnamed(bench, selection, held), *drifts)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)

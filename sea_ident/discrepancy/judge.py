@@ -23,8 +23,10 @@ EQUALLY_GOOD = 13.8
 SLIPPING = 0.1
 """Share of the torque of dry friction in a spring that must be in elements that slip to and fro [-]."""
 
-FEWEST_TO_SCATTER = 4
-"""Periods from which on their scatter along a change is known."""
+FEWEST_TO_SEARCH = 4
+"""Periods below which it cannot be told how they scatter along what an effect does: then none is looked for.
+
+Of three periods with nothing missing a fifth got a name."""
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
@@ -77,7 +79,7 @@ def scatter_p(periods: FloatArray, change: FloatArray) -> float:
     Returns:
         Probability by Student's t; 0 where there are too few periods to tell.
     """
-    if len(periods) < FEWEST_TO_SCATTER:
+    if len(periods) < FEWEST_TO_SEARCH:
         return 0.0
     size = float(np.linalg.norm(change))
     return 2.0 * float(stats.t.sf(size / max(spread(periods, change), 1e-300), step_freedom(len(periods))))

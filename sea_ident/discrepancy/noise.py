@@ -13,7 +13,13 @@ SMALLEST_HALF_WIDTH = 4
 """Noise is smoothed over at least this many harmonics to either side."""
 
 FEWEST_STEPS = 4
-"""Pairs of steps between periods from which on the spread of their energy is estimated."""
+"""Pairs of steps between periods from which on the spread of their energy is estimated: six periods, ..."""
+
+FILLED = 0.1
+"""... and share of all directions that scatter is taken to fill where there are fewer.
+
+Twenty periods of legs of all kinds fill 0.10 to 0.17 of them. With all of them instead, two to five periods reject a
+model that is right in three of ten cases at a nominal twentieth; with a tenth, in 3 to 5 %."""
 
 SMALLEST_REST = 0.1
 """A residual of which a model takes up more than all but this share says nothing about noise."""
@@ -122,7 +128,7 @@ def noise_directions(periods: FloatArray) -> float:
     gram = steps @ steps.T
     apart = gram[np.triu_indices(len(steps), 2)]
     if len(apart) < FEWEST_STEPS:
-        return float(periods.shape[1])
+        return FILLED * float(periods.shape[1])
     return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2)), 1e-300))
 
 

@@ -8,12 +8,17 @@ anything of what the named effect leaves, the named one is not what is there.
 
 What depends on a signal already is not multiplied by it: friction that grows with another power of the speed is still
 friction that grows with the speed.
+
+Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
+half a friction that grows with the load and half a torque constant. Where one that does all that both do fits as well
+alone, with a parameter less, the two are not what is there.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
+from itertools import combinations
 from typing import Self
 
 import numpy as np
@@ -44,6 +49,12 @@ PROMISED = 0.5
 TRIED = 2
 """Relatives of an effect that are fitted, those that promise most."""
 
+TRIED_FOR_TWO = 4
+"""Relatives in the place of two effects that are fitted: each of the two in the directions that promise most."""
+
+ALL_OF_IT = 0.9
+"""Share of what two effects explain that one in the place of both must promise before it is fitted [-]."""
+
 FASTER = 1.5
 """Factor of the speed by which it is tried whether columns depend on it [-]."""
 
@@ -64,6 +75,17 @@ class Growth(StrEnum):
     POSITION = "position"
 
 
+class Only(StrEnum):
+    """Where alone a relative acts."""
+
+    DRIVING = "only where the motor drives"
+    DRIVEN = "only where the motor is driven"
+    FORWARD = "only in the positive direction of motion"
+    BACKWARD = "only in the negative direction of motion"
+    POSITIVE_LOAD = "only under a positive load"
+    NEGATIVE_LOAD = "only under a negative load"
+
+
 _LOADS = (Growth.LOAD, Growth.LOAD_MAGNITUDE)
 _SPEEDS = (Growth.SPEED, Growth.SPEED_MAGNITUDE)
 
@@ -78,6 +100,7 @@ class Unnamed:
         relative: how the other differs, in words.
         share: what it leaves of what the named one leaves [-].
         fit: the whole model with it in the place of the effect.
+        second: name of another effect of the joint in the place of which it is too, None where there is none.
     """
 
     effect: str
@@ -85,6 +108,20 @@ class Unnamed:
     relative: str
     share: float
     fit: Fit
+    second: str | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it explains."""
+        if self.second is not None:
+            return (
+                f"{self.effect} and {self.second} at {self.joint} are what one effect alone does as well: "
+                f"{self.relative}, with a parameter less."
+            )
+        share = f"{100 * self.share:.2g} %"
+        return (
+            f"The same as {self.effect} at {self.joint}, but {self.relative}, leaves {share} of what that one leaves."
+        )
 
 
 @dataclass(frozen=True)
@@ -92,13 +129,15 @@ class Relative(Effect):
     """What all relatives have beside the effect that they are related to, which is their other base class.
 
     Attributes:
-        growth: what the columns are multiplied by, None where they are those of another joint.
+        growth: what the columns are multiplied by, None where by nothing.
+        only: where alone it acts, None where everywhere.
         carrier: knows the load of the joint.
         middle: position at which what grows with the position vanishes [rad] or [m].
         driver: the effect at the joint that drives it, None where it is the own.
     """
 
     growth: Growth | None = None
+    only: Only | None = None
     carrier: TorqueConstant = field(default_factory=TorqueConstant)
     middle: float = 0.0
     driver: Effect | None = None
@@ -129,6 +168,8 @@ class Relative(Effect):
         """(N,) signal that it grows with."""
         i = state.robot.index(str(self.joint))
         motion = state.motion
+        if self.only is not None:
+            return self._there(self.carrier.load(state), motion.dtheta[:, i])
         if self.growth in _LOADS:
             signal = self.carrier.load(state)
         elif self.growth in _SPEEDS:
@@ -137,6 +178,18 @@ class Relative(Effect):
             signal = motion.theta[:, i] - self.middle
         magnitude = self.growth in (Growth.LOAD_MAGNITUDE, Growth.SPEED_MAGNITUDE)
         return np.abs(signal) if magnitude else np.asarray(signal, dtype=np.float64)
+
+    def _there(self, load: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N,) one where it acts and zero elsewhere, from the load and the motor velocity."""
+        match self.only:
+            case Only.DRIVING | Only.DRIVEN:
+                way = load * dtheta
+            case Only.FORWARD | Only.BACKWARD:
+                way = dtheta
+            case _:
+                way = load
+        positive = self.only in (Only.DRIVING, Only.FORWARD, Only.POSITIVE_LOAD)
+        return np.asarray(way > 0.0 if positive else way < 0.0, dtype=np.float64)
 
 
 def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple[Relative, ...]:
@@ -171,14 +224,64 @@ def unnamed(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[U
         One entry for every such effect, with its best relative.
     """
     now = selection.final
+    pairs = _one_for_two(bench, selection, held)
     if not selection.added or lack_of_fit(bench, now)[2] >= LACK_LEVEL:
-        return ()
+        return pairs
     first, found = len(now.fit.effects) - selection.added, []
     for k in range(selection.added):
         best = _best(bench, now, first + k)
         if best is not None and _holds(best, selection, held, k):
             found.append(best)
+    return (*pairs, *found)
+
+
+def one_sided(effect: Effect) -> tuple[Relative, ...]:
+    """An effect in one direction only, in each; none of what is no torque of a single joint in every period."""
+    if effect.joint is None or is_signal(effect) or isinstance(effect, ExternalForce):
+        return ()
+    own = {item.name: getattr(effect, item.name) for item in fields(effect)}
+    kind, carrier = _related(type(effect)), TorqueConstant(joint=effect.joint)
+    return tuple(kind(**own, only=only, carrier=carrier) for only in Only)
+
+
+def _one_for_two(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
+    """Pairs of effects that were found at one joint where one alone, in one direction, does as well as both."""
+    fit, noise = selection.final.fit, selection.final.noise
+    first = len(fit.effects) - selection.added
+    found = []
+    for one, other in combinations(range(first, len(fit.effects)), 2):
+        own, second = fit.effects[one], fit.effects[other]
+        if own.joint != second.joint or own.side is not second.side:
+            continue
+        family = (*one_sided(own), *one_sided(second))
+        if not family:
+            continue
+        others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
+        reduced = bench.fit(others, noise, start=fit.parameters)
+        gain = reduced.statistic - fit.statistic
+        unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        for candidate in scan(bench, reduced, noise, family)[:TRIED_FOR_TWO]:
+            if candidate.gain < ALL_OF_IT * gain:
+                break
+            # the load is that of the model with both: without them it bends
+            relative = bench.anchored((*others, candidate.effect), fit.parameters)[-1]
+            new = refitted(bench, others, relative, (), noise, fit.parameters)
+            if new.statistic - fit.statistic > EQUALLY_GOOD * unit:
+                # the shapes of the model are those beside the two
+                new = bench.refine(new.effects, noise, start=new.parameters)
+            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and _transfers(new, selection, held):
+                share = new.excess / max(fit.excess, 1.0)
+                found.append(Unnamed(own.name, own.joint, _in_words(candidate), share, new, second.name))
+                break
     return tuple(found)
+
+
+def _transfers(fit: Fit, selection: Selection, held: HeldOut | None) -> bool:
+    """Whether the last effect of a fit with one effect less explains another motion as well."""
+    if held is None or not held.other_motion:
+        return True
+    fewer = replace(selection, final=replace(selection.final, fit=fit), added=selection.added - 1)
+    return held.again(fewer).transfers[-1].holds
 
 
 def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int) -> bool:
@@ -215,6 +318,8 @@ def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
 
 def _in_words(candidate: Candidate) -> str:
     relative = candidate.effect
+    if isinstance(relative, Relative) and relative.only is not None:
+        return f"{relative.name} {relative.only}"
     if isinstance(relative, Relative) and relative.growth is not None:
         return f"growing with the {relative.growth}"
     driver = relative.driver if isinstance(relative, Relative) else None

@@ -14,7 +14,7 @@ from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
 from sea_ident.discrepancy.trend_directions import Direction, Name, PeriodColumns, courses, steady_rows
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
-from sea_ident.discrepancy.trend_search import PRICE_OF_A_BEND, Chosen, alike, best_trend, find_trends
+from sea_ident.discrepancy.trend_search import Chosen, alike, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import Course, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
@@ -36,6 +36,10 @@ CHANCE = 4.0
 
 EQUALLY_GOOD = 13.8
 """Two trends between whose gains there is less than this (odds of a thousand) are not told apart."""
+
+FREE_BEND = 2.0
+"""What a course that bends must explain more to be as likely as a straight one where the deviations of rates are told:
+Akaike's price of a parameter, not that of a name."""
 
 SHADOW = 0.1
 """A trend beside another that explains less than this share of what no trend explains may be a part of that [-]."""
@@ -160,10 +164,10 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     left = flat if held is None else off(held, flat.ravel()).reshape(flat.shape)
     unnamed = _omnibus(left, middle, noise) < LEVEL
     if unnamed and chosen:
-        unexplained = _excess(left, middle)
+        unexplained = trend_excess(left, middle)
         if len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
             chosen = find_trends(numbers, directions, middle, noise, 1, LEVEL, matters)
-        if unexplained > UNEXPLAINED * _excess(flat, middle):
+        if unexplained > UNEXPLAINED * trend_excess(flat, middle):
             chosen = []
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
@@ -229,7 +233,7 @@ def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(flat))))
 
 
-def _excess(flat: FloatArray, middle: FloatArray) -> float:
+def trend_excess(flat: FloatArray, middle: FloatArray) -> float:
     """What the linear trend in everything is beyond the scatter of the periods."""
     profile = middle - middle.mean()
     along = profile @ flat / np.linalg.norm(profile)
@@ -283,8 +287,8 @@ def _trend(
     """One of the trends that were chosen, its values beside the others, and what else it could be."""
     own, others = chosen[position], [c for k, c in enumerate(chosen) if k != position]
     direction = own.direction
-    together = [Course(c.direction.profile, c.direction.columns, _free_bend(c.direction)) for c in (own, *others)]
-    values, *_ = course_values(numbers, together)
+    beside = [_course(c.direction) for c in others]
+    values, *_ = course_values(numbers, [_course(direction), *beside])
     held = held_basis([c.direction for c in others])
     taken = {c.direction.name for c in chosen}
     alternatives: dict[Name, tuple[Effect, float]] = {}
@@ -292,19 +296,23 @@ def _trend(
         if other.name in taken:
             continue
         amount = gain(numbers, other, held)[0]
-        uncaused = direction.effect.name, other.name == ("friction_drift", direction.effect.joint)
-        if uncaused == ("temperature_friction", True) and amount < own.gain + PRICE_OF_A_BEND:
-            continue  # the same without its cause: a measured temperature says more than any time that does no better
         if own.gain - amount < EQUALLY_GOOD:
             share = alike(numbers, direction, other, held)
             if share > alternatives.get(other.name, (other.effect, 0.0))[1]:
                 alternatives[other.name] = (other.effect, share)
     at_start = _at_start(direction, values.values)
+    # of a share of what drifts itself: d (v / (1 + v c)) = (1 / (1 + v c))^2 dv
+    stds = values.stds * (at_start / np.where(values.values == 0.0, 1.0, values.values)) ** 2
+    bends = [d for d in directions if d.name == direction.name and d.bent]
+    if bends and not direction.bent:
+        bent = max(bends, key=lambda d: gain(numbers, d, held)[0])
+        rival, *_ = course_values(numbers, [_course(bent), *beside])
+        odds = np.exp(0.5 * (gain(numbers, bent, held)[0] - own.gain - FREE_BEND))
+        stds = _of_either(at_start, stds, _at_start(bent, rival.values), rival.stds, float(odds / (1.0 + odds)))
     return Trend(
         effect=direction.effect,
         values=at_start,
-        # of a share of what drifts itself: d (v / (1 + v c)) = (1 / (1 + v c))^2 dv
-        stds=values.stds * (at_start / np.where(values.values == 0.0, 1.0, values.values)) ** 2,
+        stds=stds,
         gain=own.gain,
         p_value=own.p_value,
         torque_change=change(direction, values.values),
@@ -319,5 +327,18 @@ def _at_start(direction: Direction, values: FloatArray) -> FloatArray:
     return direction.effect.referred(values, direction.level)
 
 
-def _free_bend(direction: Direction) -> FloatArray | None:
-    return direction.bend if direction.bent else None
+def _course(direction: Direction) -> Course:
+    return Course(direction.profile, direction.columns, direction.bend if direction.bent else None)
+
+
+def _of_either(
+    values: FloatArray, stds: FloatArray, others: FloatArray, their: FloatArray, chance: float
+) -> FloatArray:
+    """(k,) standard deviations of values that by some chance are those of another model.
+
+    As Buckland, Burnham, Augustin, Model selection: an integral part of inference, Biometrics 53, 1997.
+
+    A course that is called straight because nothing speaks for its bend may bend all the same: the rate at its start is
+    another one then, by far more than the scatter around a straight course.
+    """
+    return np.sqrt((1.0 - chance) * stds**2 + chance * (their**2 + (others - values) ** 2))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
+from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.standing import Standing
@@ -119,7 +120,12 @@ def _held_sentence(facts: Facts) -> str:
 def reservations(facts: Facts) -> list[str]:
     """What to know before trusting the diagnosis."""
     found = []
-    if facts.periods < FEW_PERIODS:
+    if facts.periods < FEWEST_TO_SEARCH:
+        found.append(
+            f"{facts.periods} periods only: how they scatter along what an effect does cannot be told, and nothing "
+            f"finer than friction that the model does not have at all was looked for; record {FEW_PERIODS} or more"
+        )
+    elif facts.periods < FEW_PERIODS:
         found.append(
             f"{facts.periods} periods only: the noise floor is uncertain and small effects are not told from it; "
             f"record {FEW_PERIODS} or more"
@@ -138,6 +144,14 @@ def reservations(facts: Facts) -> list[str]:
         found.append("no held-out motion was given: what is named was not tested on another motion")
     if facts.standing is not None and facts.standing.share > STANDS_LONG:
         found.append(f"{_not_compared(facts, facts.standing)}. Let the joint pass zero velocity faster")
+    if any(
+        {m.effect, *(a.effect for a in m.alternatives)} >= {"temperature_friction", "friction_drift"}
+        for m in facts.missing
+    ):
+        found.append(
+            "the temperature goes the way that a drift goes by itself: whether friction follows it or the time is not "
+            "told. Record the same once more while it goes another way, as in cooling down"
+        )
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")
     return found
@@ -160,12 +174,6 @@ def _percent(share: float) -> str:
 
 def _name(m: MissingEffect) -> str:
     return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
-
-
-def _better(one: Unnamed) -> str:
-    """What a nameless relative of an effect explains."""
-    share = f"{100 * one.share:.2g} %"
-    return f"The same as {one.effect} at {one.joint}, but {one.relative}, leaves {share} of what that one leaves."
 
 
 def _opening(facts: Facts) -> str:
@@ -194,7 +202,7 @@ def _opening(facts: Facts) -> str:
             return f"Something is missing; it looks like {names}, but that does not hold on other data."
         case Verdict.NOT_IN_LIBRARY:
             near = f" The nearest is {names}, which is no full explanation." if names else ""
-            better = "".join(f" {_better(relative)}" for relative in facts.nameless)
+            better = "".join(f" {relative.sentence}" for relative in facts.nameless)
             return f"Something is missing that is not in the library.{near}{better}"
         case Verdict.ONLY_AGAINST_REFERENCE:
             return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."

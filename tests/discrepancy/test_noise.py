@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.noise import (
@@ -17,6 +18,7 @@ from sea_ident.discrepancy.noise import (
 from sea_ident.discrepancy.settle import settle
 
 HARMONICS = 150
+DRAWS = 400
 
 
 def scatter(rng, periods, mixing, offset=0.0):
@@ -114,8 +116,36 @@ def test_directions_of_scatter_of_low_rank_are_its_rank(rank):
     assert np.median(found) == pytest.approx(rank, rel=0.25)
 
 
-def test_too_few_steps_tell_no_directions():
-    assert noise_directions(np.random.default_rng(9).standard_normal((4, 50))) == 50.0
+@pytest.mark.parametrize("periods", [2, 3, 4, 5])
+def test_size_of_the_lack_of_fit_where_steps_are_too_few_to_tell_directions(periods):
+    """Scatter that fills a ninth of its directions, as that of a leg does: a right mean is rarely rejected."""
+    rng, width = np.random.default_rng(9), 400
+    size = np.where(np.arange(width) < width // 20, 6.0, 1.0)
+    assert np.sum(size**2) ** 2 / np.sum(size**4) / width == pytest.approx(0.115, abs=1e-3)
+    rejected = []
+    for _ in range(DRAWS):
+        flat = size * rng.standard_normal((periods, width))
+        ratio = (
+            periods * np.sum(np.mean(flat, axis=0) ** 2) / (np.sum(np.diff(flat, axis=0) ** 2) / 2.0 / (periods - 1))
+        )
+        directions = noise_directions(flat)
+        rejected.append(stats.f.sf(ratio, directions, directions * step_freedom(periods)) < 0.05)
+    assert 0.005 < np.mean(rejected) < 0.09
+
+
+@pytest.mark.slow
+def test_size_of_the_lack_of_fit_of_four_periods(laboratory):
+    """Legs that lack nothing, four periods each: about one in twenty is rejected at that level, and hardly more."""
+    rejected = []
+    for seed in range(20, 40):
+        recording = laboratory.record(periods=12, seed=seed)
+        for begin in (0.0, 20.0, 40.0):
+            first = float(recording.time[0]) + begin
+            part = laboratory.bench(recording.crop(first, first + 4 * 5.0))
+            assert part.data.periods == 4
+            rejected.append(lack_of_fit(part, settle(part, part.effects))[2] < 0.05)
+    # 60 draws at a twentieth: three, nine or more in less than one of three hundred
+    assert np.sum(rejected) <= 8
 
 
 def test_a_leg_that_lacks_nothing_leaves_its_noise(laboratory, nothing_missing):

@@ -91,6 +91,34 @@ def test_torque_of_one_joint_in_the_signal_of_another(nothing_missing):
     assert one.fit.parameters[column.name] == pytest.approx(0.05, rel=0.05)
 
 
+def test_two_effects_that_are_one_in_one_direction(nothing_missing):
+    """A fifth of the load is lost where the motor drives: half looks like friction, half like a torque constant."""
+    bench, start = nothing_missing
+    loss = bench.anchored((*start.fit.effects, make_effect("directional_efficiency", "knee")), start.fit.parameters)[-1]
+    bench = with_torque(bench, (KNEE, 0.2 * loss.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0]))
+    both = [make_effect(name, "knee") for name in ("torque_constant", "load_dependent_friction")]
+    selection = found(bench, *both)
+    assert [selection.final.fit.parameters[f"knee.{e.name}"] for e in both] == pytest.approx([0.1, 0.1], rel=0.1)
+    (one,) = unnamed(bench, selection, None)
+    assert {one.effect, one.second} == {e.name for e in both}
+    assert one.relative.endswith("only where the motor drives")
+    column = one.fit.effects[-1].columns(bench.robot)[0]
+    assert one.fit.parameters[column.name] == pytest.approx(0.2, rel=0.05)
+    confirmed = Confirmed(selection, bench, selection.start, selection.final)
+    said = conclude(bench, confirmed, TrendTest(1.0, (), False), {}, None, None, Findings(), (one,))
+    assert said.verdict is Verdict.NOT_IN_LIBRARY
+    assert "are what one effect alone does as well" in said.text
+
+
+def test_two_effects_of_sizes_of_their_own_stay_two(nothing_missing):
+    bench, start = nothing_missing
+    both = [make_effect(name, "knee") for name in ("torque_constant", "load_dependent_friction")]
+    anchored = bench.anchored((*start.fit.effects, *both), start.fit.parameters)[-2:]
+    rows = [e.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0] for e in anchored]
+    bench = with_torque(bench, (KNEE, 0.06 * rows[0] + 0.12 * rows[1]))
+    assert unnamed(bench, found(bench, *both), None) == ()
+
+
 @pytest.mark.parametrize(
     ("name", "shape", "growths"),
     [

@@ -10,6 +10,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import Trend, _omnibus, compare_periods, within_periods
 from sea_ident.effects import effect_classes, make_effect
+from sea_ident.effects.temperature_friction import TemperatureFriction
 from sea_ident.recordings import Recording
 
 LEVEL = 0.05
@@ -85,8 +86,26 @@ def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(l
     bench = Bench(data, laboratory.effects)
     now = settle(bench, bench.effects)
     (trend,) = compare_periods(bench, now.fit, now.noise, check.temperatures(recording, data)).trends
-    assert (trend.effect.name, trend.effect.joint, trend.alternatives) == ("temperature_friction", "knee", ())
+    assert (trend.effect.name, trend.effect.joint) == ("temperature_friction", "knee")
     assert np.all(np.abs(trend.values - [0.0, -0.05]) < 3.0 * trend.stds)
+    # the temperature goes the way that a drift goes by itself: nothing tells the two apart
+    ((other, cos2),) = trend.alternatives
+    assert (other.name, other.joint) == ("friction_drift", "knee")
+    assert cos2 > 0.95
+
+
+def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch):
+    """It rises for half of the recording and falls again: no course in time does that."""
+
+    def rise_and_fall(effect, time):
+        return effect.reference + 15.0 * np.sin(np.pi * time / 60.0)
+
+    monkeypatch.setattr(TemperatureFriction, "temperature", rise_and_fall)
+    recording = laboratory.record([("temperature_friction", "knee", [0.0, -0.05], {})], periods=12)
+    bench = laboratory.bench(recording)
+    now = settle(bench, bench.effects)
+    (trend,) = compare_periods(bench, now.fit, now.noise, check.temperatures(recording, bench.data)).trends
+    assert (trend.effect.name, trend.effect.joint, trend.alternatives) == ("temperature_friction", "knee", ())
 
 
 def test_what_the_library_lacks_is_not_named_by_a_part_of_it(softening, monkeypatch):

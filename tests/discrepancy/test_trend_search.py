@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.trend import _trend
 from sea_ident.discrepancy.trend_directions import Cause, courses
 from sea_ident.discrepancy.trend_search import alike, best_trend, find_trends
 from sea_ident.effects import make_effect
+from sea_ident.effects.drift import warming
 
 PERIODS, NUMBERS = 20, 12
 MIDDLE = 5.0 * (np.arange(PERIODS) + 0.5)
@@ -117,3 +119,20 @@ def test_share_that_another_explains():
     flat = np.outer(MIDDLE - MIDDLE.mean(), one)
     share = alike(flat, trend(one, "hip")[-1], trend(near, "knee")[-1], None)
     assert share == pytest.approx(0.25, rel=1e-6)
+
+
+@pytest.mark.parametrize("time_constant", [40.0, 300.0, 1e6])
+def test_a_rate_is_as_sure_as_is_said_whether_its_course_bends_or_not(time_constant):
+    """Where a bend just does not show, the rate at the start is another one than that of a straight line."""
+    rng = np.random.default_rng(10)
+    one, other = axes(2)
+    directions = [*trend(one, "hip"), *trend(0.6 * one + 0.8 * other, "knee")]
+    rate, course = 15.0, warming(MIDDLE, time_constant)
+    scores = []
+    for _ in range(60):
+        flat = noisy(rng, *(np.outer(rate * course, d) for d in (one, 0.6 * one + 0.8 * other)))
+        chosen = find_trends(flat, directions, MIDDLE, FLOOR, 2, 1e-3, lambda d, v: True)
+        trends = [_trend(flat, chosen, k, directions, lambda d, v: 0.1) for k in range(len(chosen))]
+        scores.extend((t.values[0] - rate) / t.stds[0] for t in trends)
+    assert len(scores) > 60
+    assert np.sqrt(np.mean(np.square(scores))) < 1.7

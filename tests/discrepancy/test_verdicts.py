@@ -105,6 +105,15 @@ def test_cannot_tell_from_one_pass(leg, series, model):
     assert quietly(model, motion).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
 
 
+def test_of_three_periods_nothing_fine_is_named(leg, series):
+    """What is missing shows in them, but not how they scatter along it."""
+    recording = recorded(leg, series[0], [named("torque_ripple", "hip", [1.0, 0.5], order=4.0)], periods=3)
+    found = quietly(identified(leg, recording), recording)
+    assert found.lack_of_fit.p_value < 1e-3
+    assert (found.verdict, found.missing) == (Verdict.CANNOT_TELL, ())
+    assert any("nothing finer than" in text for text in found.warnings)
+
+
 def test_every_verdict_follows_from_findings():
     class Data:
         periods = 20
@@ -119,8 +128,14 @@ def test_every_verdict_follows_from_findings():
     effect = MissingEffect("torque_ripple", "hip", (), 0.05, 1e-9, ())
     other = replace(effect, alternatives=(Alternative("torque_offset", "hip", 1.0),))
 
-    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True):
-        return verdict_of(Bench(), missing, Trends(), None, remainder, unexplained, Findings((), fatal), holds)
+    class Drifts(Trends):
+        trends = (object(),)
+
+    class LeavesAnother(Drifts):
+        unnamed = True
+
+    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True, trends=Trends):
+        return verdict_of(Bench(), missing, trends(), None, remainder, unexplained, Findings((), fatal), holds)
 
     assert verdict([]) is Verdict.NONE
     assert verdict([effect]) is Verdict.NAMED
@@ -128,6 +143,9 @@ def test_every_verdict_follows_from_findings():
     assert verdict([effect], remainder=0.011) is Verdict.NOT_IN_LIBRARY
     assert verdict([replace(effect, effect="coulomb_friction")], remainder=0.011) is Verdict.NAMED_WITH_REMAINDER
     assert verdict([effect], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
+    # what drifts is in the mean too, but not where the periods show more than what was named
+    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=LeavesAnother) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
     assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
     assert verdict([effect], holds=False) is Verdict.SUSPECT

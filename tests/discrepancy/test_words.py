@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
@@ -34,6 +34,21 @@ def test_few_periods_are_said_before_the_name(verdict):
     few = paragraph(facts(verdict, periods=3))
     assert few.startswith("As far as 3 periods can show, the model lacks torque_offset at hip")
     assert "10 periods to be sure" in few
+
+
+@pytest.mark.parametrize(("periods", "said"), [(3, "nothing finer than"), (4, "small effects"), (9, "small effects")])
+def test_what_few_periods_leave_open_is_said(periods, said):
+    (warning,) = reservations(replace(facts(Verdict.NONE, periods=periods), missing=()))
+    assert warning.startswith(f"{periods} periods only")
+    assert said in warning
+    assert reservations(replace(facts(Verdict.NONE, periods=10), missing=())) == []
+
+
+def test_a_temperature_that_cannot_be_told_from_time_is_said():
+    warm = MissingEffect("temperature_friction", "hip", (), 0.05, 1e-9, (Alternative("friction_drift", "hip", 1.0),))
+    for missing, said in (((warm,), True), ((replace(warm, alternatives=()),), False)):
+        found = reservations(replace(facts(Verdict.AMBIGUOUS), missing=missing))
+        assert any("cooling down" in text for text in found) is said
 
 
 def test_a_recording_with_a_fault_is_to_blame_not_the_number_of_its_periods():

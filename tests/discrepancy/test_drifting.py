@@ -1,0 +1,65 @@
+"""A drift that the library does not have is not named by what was found of it in the mean and over the periods."""
+
+import pytest
+
+from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.check import Findings
+from sea_ident.discrepancy.conclude import conclude
+from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.drifting import drifting
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.trend import TrendTest, compare_periods
+from sea_ident.effects import effect_classes, make_effect
+
+
+def compared(laboratory, planted, found):
+    """A recording with what was found in its mean, and the comparison of its periods."""
+    bench = laboratory.bench(laboratory.record(planted, periods=8))
+    start = settle(bench, bench.effects)
+    begun = bench.anchored((*start.fit.effects, make_effect(*found)), start.fit.parameters)
+    now = settle_again(bench, bench.fit(begun, start.noise, start=start.fit.parameters))
+    return bench, start, now, compare_periods(bench, now.fit, now.noise)
+
+
+@pytest.fixture
+def without_drift_of_torque(monkeypatch):
+    """The library without the drift of a torque constant."""
+    less = {name: kind for name, kind in effect_classes().items() if name != "torque_constant_drift"}
+    monkeypatch.setattr("sea_ident.discrepancy.trend_directions.effect_classes", lambda: less)
+
+
+def test_a_torque_constant_that_drifts_is_no_friction_that_does(laboratory, without_drift_of_torque):
+    planted = [("torque_constant_drift", "knee", [-0.4], {})]
+    bench, start, now, trends = compared(laboratory, planted, ("torque_constant", "knee"))
+    # something changes, and whether it got the nearest name or none hangs on how much that leaves
+    assert trends.p_value < 1e-3
+    nearest = TrendTest(trends.p_value, (), True)
+    for said in (trends, nearest):
+        (one,) = drifting(bench, now, said)
+        assert (one.relative, one.joint) == ("torque_constant", "knee")
+        assert "the torque_constant at knee drifts explains what changes from period to period" in one.sentence
+    selection = Selection(start, now, 1, (0.0,))
+    confirmed = Confirmed(selection, bench, start, now)
+    diagnosis = conclude(bench, confirmed, nearest, {}, None, None, Findings(), (one,))
+    assert diagnosis.verdict is Verdict.NOT_IN_LIBRARY
+    assert one.sentence in diagnosis.text
+
+
+@pytest.mark.parametrize(
+    ("drift", "found"),
+    [
+        (("friction_drift", "knee", [0.0, -0.6], {}), ("torque_constant", "knee")),
+        (("torque_constant_drift", "knee", [-0.4], {}), ("torque_constant", "knee")),
+    ],
+)
+def test_a_drift_of_the_library_keeps_its_name_beside_what_was_found(laboratory, drift, found):
+    planted = [drift, (*found, [0.05], {})]
+    bench, _, now, trends = compared(laboratory, planted, found)
+    assert [(t.effect.name, t.effect.joint) for t in trends.trends] == [drift[:2]]
+    assert drifting(bench, now, trends) == ()
+
+
+def test_what_stays_as_it_is_does_not_drift(laboratory):
+    bench, _, now, trends = compared(laboratory, [("torque_constant", "knee", [0.05], {})], ("torque_constant", "knee"))
+    assert drifting(bench, now, TrendTest(trends.p_value, (), True)) == ()
