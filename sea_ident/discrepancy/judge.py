@@ -11,6 +11,7 @@ from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import NoiseFloor, step_freedom
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
+from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 
@@ -27,6 +28,9 @@ FEWEST_TO_SEARCH = 4
 """Periods below which it cannot be told how they scatter along what an effect does: then none is looked for.
 
 Of three periods with nothing missing a fifth got a name."""
+
+SPRING_LAW = ("spring_stiffness", "spring_stiffening")
+"""Parameters of the law of a spring with two equal sides."""
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
@@ -154,6 +158,21 @@ def dissipates(bench: Bench, effect: Effect, values: FloatArray) -> bool:
     return float(np.sum(np.abs(values[slipping]))) > SLIPPING * float(np.sum(np.abs(values)))
 
 
+def pushes_back(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether a spring with two different sides is stiff, and not the opposite, as far as this motion deflects it.
+
+    To either side: a spring that is always loaded one way is a spring all the same, and not by the other side alone.
+    """
+    effect = fit.effects[position]
+    if not isinstance(effect, AsymmetricSpring):
+        return True
+    deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(effect.required_joint)]
+    deflection = np.concatenate([deflection, -deflection])
+    linear, cubic = (fit.parameters.get(f"{effect.joint}.{name}", 0.0) for name in SPRING_LAW)
+    slope = linear + 3.0 * cubic * deflection**2 + fit.parameters[effect.parameter_name()] * effect.slope(deflection)
+    return bool(np.min(slope) > 0.0)
+
+
 def physical(bench: Bench, fit: Fit, position: int) -> bool:
     """Whether an effect of a model is possible.
 
@@ -169,6 +188,8 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
         return True
     values = fit.values[start : start + len(columns)]
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
+        return False
+    if not pushes_back(bench, fit, position):
         return False
     spectra = bench.column_spectra(effect, fit.effects)
     power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))

@@ -60,6 +60,12 @@ class AsymmetricSpring(SpringEffect):
         stiffness = parameters.get(f"{self.joint}.spring_stiffness", 0.0)
         return bool(self.exponent > 1.0 or abs(values[0]) < abs(stiffness))
 
+    def slope(self, deflection: FloatArray) -> FloatArray:
+        """(N,) stiffness at deflections (N,) of a spring with K = 1, of either sign."""
+        beyond = deflection - self.kink
+        slope: FloatArray = self.exponent * np.sign(beyond) * np.abs(beyond) ** (self.exponent - 1.0)
+        return slope
+
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """|theta - q - d|^p."""
         return (np.abs(theta - q - self.kink) ** self.exponent)[:, None]

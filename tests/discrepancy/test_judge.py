@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.diagnose import _out
-from sea_ident.discrepancy.judge import dissipates, physical
+from sea_ident.discrepancy.judge import dissipates, physical, pushes_back
 from sea_ident.effects import make_effect
 
 
@@ -49,3 +49,24 @@ def test_a_spring_that_takes_next_to_no_energy_out_is_not_accepted(nothing_missi
 def test_what_does_not_hold_goes_and_where_nothing_holds_the_worst(shares, drifting, out):
     transfers = [SimpleNamespace(share=share, holds=share > 0.5) for share in shares]
     assert _out(SimpleNamespace(transfers=transfers), drifting) == out
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.1, 2.0])
+def test_a_spring_with_two_sides_is_stiff_to_either_side(nothing_missing, exponent):
+    bench, start = nothing_missing
+    effect = make_effect("asymmetric_spring", "knee", exponent=exponent, kink=0.002)
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    names = [c.name for c in fit.columns]
+    law = [names.index(f"knee.{name}") for name in ("spring_stiffness", "spring_stiffening", "asymmetric_spring")]
+    # the limit by the torque itself: it must grow with the deflection
+    farthest = float(np.max(np.abs(bench.data.motion.deflection[:, 1])))
+    d = np.linspace(-farthest, farthest, 2001)
+    rows = np.stack([d, d**3, np.abs(d - effect.kink) ** exponent], axis=1)
+    seen = set()
+    for amount in (-9000.0, -900.0, -250.0, -50.0, 0.0, 50.0, 250.0, 900.0, 9000.0):
+        values = fit.values.copy()
+        values[law[-1]] = amount
+        grows = bool(np.all(np.diff(rows @ values[law]) > 0.0))
+        assert pushes_back(bench, replace(fit, values=values), -1) == grows, amount
+        seen.add(grows)
+    assert seen == {True, False}
