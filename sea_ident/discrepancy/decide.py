@@ -22,6 +22,10 @@ Alternatives = dict[int, tuple[Alternative, ...]]
 CLEARLY = 1.0
 """What a simpler effect must save, in units of the statistic."""
 
+UNDECIDED = 0.1
+"""Share of what neither explains on the other motion that a difference between two must exceed [-]: something else is
+wrong there, and could lean to either."""
+
 OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 """Factors by which a shape is moved where it may be open."""
 
@@ -220,4 +224,4 @@ def _better(one: Transfer, other: Transfer) -> bool:
     """Whether one effect does better than another on the other motion beyond doubt, and holds there."""
     if not (one.tested and one.holds):
         return False
-    return other.statistic - one.statistic > EQUALLY_GOOD * one.unit
+    return other.statistic - one.statistic > max(EQUALLY_GOOD * one.unit, UNDECIDED * one.excess)

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import Confirmed
-from sea_ident.discrepancy.decide import decide
+from sea_ident.discrepancy.decide import _better, decide
 from sea_ident.discrepancy.diagnose import _tested
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import Kind, tried
@@ -108,3 +109,16 @@ def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_tur
     selection, left, _ = decide(bench, selection, listed, tried(other, selection, "another motion"))
     assert [e.name for e in selection.effects] == ["spring_offset", "load_dependent_friction"]
     assert left == {first: (), first + 1: ()}
+
+
+def test_what_neither_explains_leans_to_none():
+    """Where much is left on the other motion, a difference that is small beside that decides nothing."""
+    leaning = 27.0
+    worse = Transfer(share=0.95, tested=True, statistic=1700.0 + leaning, unit=1.1, excess=leaning)
+    better = Transfer(share=0.95, tested=True, statistic=1700.0, unit=1.1, excess=0.0)
+    assert _better(better, worse)
+    assert not _better(worse, better)
+    left = 4000.0
+    both = [replace(t, statistic=t.statistic + left, excess=t.excess + left) for t in (better, worse)]
+    assert not _better(*both)
+    assert _better(both[0], replace(both[1], statistic=both[1].statistic + 0.2 * left))
