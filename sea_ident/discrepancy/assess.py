@@ -21,6 +21,7 @@ from sea_ident.discrepancy.judge import (
     significance,
     slowest,
     spread,
+    too_short,
 )
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, step_freedom
@@ -73,7 +74,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             beat = fit.statistic + enough
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             price = penalty(candidate.effect, bench) - penalty(own, bench)
-            if slowest(new.effects[position]):
+            if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
                 continue
             if new.statistic - fit.statistic < enough and physical(bench, new, position):
                 explained = reduced.whitened - fit.whitened

@@ -60,6 +60,21 @@ def test_a_kink_never_passed_is_declared_beside_an_offset_and_play_before_a_stif
     assert not {"backlash", "asymmetric_spring"} & knee
 
 
+def test_what_is_shorter_than_is_compared_is_no_rival(preloaded, monkeypatch):
+    """As a push that never pauses, which is a constant by the name of a push."""
+    bench, _, selection = preloaded
+    asked = []
+
+    def short(where, effect):
+        asked.append(where)
+        return effect.name == "asymmetric_spring"
+
+    monkeypatch.setattr("sea_ident.discrepancy.assess.too_short", short)
+    found = declared(rivals(bench, selection))
+    assert asked
+    assert "asymmetric_spring" not in {a.effect for others in found.values() for a in others}
+
+
 @pytest.mark.parametrize("effect", SAME_TORQUE, ids=lambda e: f"{e.name} {getattr(e, 'kink', '')}")
 def test_a_transfer_is_the_same_however_the_same_torque_is_written(preloaded, effect):
     """A kink takes a part of the stiffness along: that part is there too where the effect is held."""
