@@ -14,6 +14,10 @@ VARIANTS_KEPT = 3e8
 """Bytes of columns of candidates that are kept for the next search."""
 
 
+DIGITS = 1e-7
+"""Share of the largest column of an effect below which another is nothing but the digits of a description [-]."""
+
+
 class Columns:
     """Evaluates effects on one recording.
 
@@ -48,7 +52,7 @@ class Columns:
         if key not in self._columns:
             if len(self._columns) > 400:
                 self._columns.clear()
-            self._columns[key] = self._spectra(effect.evaluate(self.state(signals)), signals)
+            self._columns[key] = without_digits(self._spectra(effect.evaluate(self.state(signals)), signals))
         return self._columns[key]
 
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
@@ -110,3 +114,17 @@ class Columns:
             return effects
         anchor = Anchor(self.robot, effects, parameters)
         return tuple(effect.anchored(anchor) for effect in effects)
+
+
+def without_digits(spectra: ComplexArray) -> ComplexArray:
+    """Columns (H + 1, E, k) of one effect, exactly zero where an axis given to seven digits would make them something.
+
+    The parameter of such a column would be as large as it takes to explain noise. That does no harm by itself, but what
+    depends on it, as gravity on a tilted base, would be anything.
+    """
+    sizes = np.sqrt(np.sum(np.abs(spectra) ** 2, axis=(0, 1)))
+    nothing = sizes < DIGITS * np.max(sizes, initial=0.0)
+    if np.any(nothing):
+        spectra = spectra.copy()
+        spectra[:, :, nothing] = 0.0
+    return spectra

@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, check, words
-from sea_ident.discrepancy.base_model import BASIC
+from sea_ident.discrepancy.base_model import BASIC, FRICTION
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.data import waveform
@@ -225,7 +225,9 @@ def verdict_of(
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
-    nameless = remainder > WORTH_A_NAME and not all(m.effect in BASIC for m in structural)
+    # beside a friction that the model did not have at all more is left: finer effects come after it
+    basic = all(m.effect in BASIC for m in structural) and any(m.effect in FRICTION for m in structural)
+    nameless = remainder > WORTH_A_NAME and not basic
     # what drifts is in the mean too, where all that changes is known
     drifts = bool(trends.trends) and not trends.unnamed
     if large and (unexplained > UNEXPLAINED or nameless) and not drifts:

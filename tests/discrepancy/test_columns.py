@@ -1,0 +1,36 @@
+"""Columns of effects as spectra."""
+
+import numpy as np
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.columns import without_digits
+from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.settle import settle
+from sea_ident.effects import base_effects, spring_effects
+from sea_ident.regressor import prior_parameters
+from sea_ident.robot import load_robot
+
+
+def test_what_is_less_than_the_digits_of_a_description_is_nothing():
+    columns = np.ones((3, 2, 4), dtype=np.complex128) * [1.0, 1e-6, 1e-8, 1e-16]
+    np.testing.assert_array_equal(np.any(without_digits(columns), axis=(0, 1)), [True, True, False, False])
+    np.testing.assert_array_equal(without_digits(columns)[:, :, :2], columns[:, :, :2])
+    assert without_digits(columns[:, :, :0]).shape == (3, 2, 0)
+    np.testing.assert_array_equal(without_digits(0.0 * columns), 0.0 * columns)
+
+
+def test_parameters_that_only_digits_would_show_stay_as_described(laboratory, tmp_path):
+    """The leg with axes that are level to eight digits: what acts out of its plane is not seen."""
+    text = laboratory.leg.urdf
+    assert text.count('<axis xyz="0 -1 0"/>') >= 3
+    file = tmp_path / "nearly.urdf"
+    file.write_text(text.replace('<axis xyz="0 -1 0"/>', '<axis xyz="3e-9 -1 5e-9"/>'))
+    nearly = load_robot(file)
+    data = period_data(wide_processing(laboratory.record(), nearly, 5.0), nearly)
+    bench = Bench(data, (*base_effects(nearly), *spring_effects(nearly)))
+    fit = settle(bench, bench.effects).fit
+    described = np.nan_to_num(prior_parameters(nearly, fit.effects))
+    inertial = [k for k, c in enumerate(fit.columns) if c.name in set(nearly.inertial_names)]
+    assert len(inertial) == 10 * len(nearly.body_indices)
+    assert np.max(np.abs(fit.values[inertial] - described[inertial])) < 5.0
+    assert fit.statistic < 1.3 * fit.dof
