@@ -21,6 +21,9 @@ CLIPPED_RUN = 4
 CLIPPED_SHARE = 0.05
 """Share of clipped samples beyond which nothing can be told."""
 
+NOTHING_IN_COMMON = 0.5
+"""Spread between periods, as a share of the motion, from which on they are not periods of one motion [-]."""
+
 SPIKE = 8.0
 """How many times farther than the farthest sample of a usual period a sample must lie to count as a spike."""
 
@@ -147,6 +150,13 @@ def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) ->
     return out if np.any(np.isfinite(out)) else None
 
 
+def _one_motion(data: PeriodData) -> bool:
+    """Whether the periods are about the same in one joint at least."""
+    theta = np.stack([motion.theta for motion in data.period_motions])
+    between = np.sqrt(np.mean(theta.var(axis=0, ddof=1), axis=0))
+    return bool(np.any(between < NOTHING_IN_COMMON * theta.std(axis=(0, 1))))
+
+
 def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tuple[PeriodData, Findings]:
     """The data without periods that hold spikes and without clipped torques, with what was found.
 
@@ -159,6 +169,12 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
     """
     warnings = list(data.warnings)
     fatal = False
+    if not _one_motion(data):
+        warnings.append(
+            f"{data.source}: what lies {data.period:g} s apart has nothing in common in any joint: that is not the "
+            "period of this motion. Give the period that was excited (period=; on the command line, --period of identify)"
+        )
+        fatal = True
     spiked = _spiked_periods(data)
     if spiked:
         keep = [p for p in range(data.periods) if p not in spiked]

@@ -25,9 +25,11 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
         settled: the model and its noise floor.
 
     Returns:
-        Statistic, its degrees of freedom, and the probability of as much by noise.
+        Statistic, its degrees of freedom, and the probability of as much by noise; one where nothing is compared.
     """
     statistic, dof = settled.fit.statistic, settled.fit.dof
+    if dof <= 0:
+        return statistic, 0, 1.0
     periods = flat_periods(bench, settled)
     basis = settled.fit.basis
     periods = periods - (periods @ basis) @ basis.T  # the samples that are left out are out of them already

@@ -106,3 +106,15 @@ def test_the_gap_is_closed_and_the_history_kept(leg, stribeck):
     assert "knee.stribeck_friction" in names
     before, after = (float(sea_ident.validate(m, holdout).rms[1]) for m in (model, closed.model))
     assert after < 0.8 * before
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_period_that_is_none_of_the_motion_is_said_and_written(leg, intact, tmp_path):
+    """Periods of four seconds of a motion of five have nothing in common: no sample is left to be compared."""
+    model = sea_ident.identify(leg, intact[0], period=4.0)
+    found = sea_ident.diagnose(model, intact[0], period=4.0)
+    assert str(found.verdict) == "cannot_tell"
+    assert any("not the period of this motion" in text for text in found.warnings)
+    found.save(tmp_path / "diagnosis.json")
+    written = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert 0.0 <= written["lack_of_fit"]["p_value"] <= 1.0
