@@ -172,7 +172,7 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
     if not _one_motion(data):
         warnings.append(
             f"{data.source}: what lies {data.period:g} s apart has nothing in common in any joint: that is not the "
-            "period of this motion. Give the period that was excited (period=; on the command line, --period of identify)"
+            "period of this motion. Give the period that was excited (period=, or --period of identify)"
         )
         fatal = True
     spiked = _spiked_periods(data)
