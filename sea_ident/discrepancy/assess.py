@@ -15,7 +15,7 @@ from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.judge import (
     EQUALLY_GOOD,
     FEWEST_TO_SEARCH,
-    flat_periods,
+    flat_steps,
     penalty,
     physical,
     significance,
@@ -223,7 +223,7 @@ def detectability(
         One entry for every candidate.
     """
     tests = max(sum(c.tests for c in candidates), 1)
-    periods = flat_periods(*judged) if judged[0].data.periods > 1 else np.zeros((0, 0))
+    steps = flat_steps(*judged) if judged[0].data.periods > 1 else np.zeros((0, 0))
     candidates = [c for c in candidates if np.any(c.directions)]
     bases = [_orthonormal(c.directions) for c in candidates]
     labels = [_label(c) for c in candidates]
@@ -241,7 +241,7 @@ def detectability(
         absorbed, effect = candidate.absorbed, candidate.effect
         if effect.name in LIVE_BESIDE_REVERSALS:
             effect = _usual(effect)
-            smallest, absorbed = _beside_reversals(judged, effect, tests, periods)
+            smallest, absorbed = _beside_reversals(judged, effect, tests, steps)
         mine = slice(starts[i], starts[i + 1])
         alike = []
         for k in range(len(candidates)):
@@ -275,7 +275,7 @@ def _usual(effect: Effect) -> Effect:
 
 
 def _beside_reversals(
-    judged: tuple[Bench, Settled], effect: Effect, tests: int, periods: FloatArray
+    judged: tuple[Bench, Settled], effect: Effect, tests: int, steps: FloatArray
 ) -> tuple[float, float]:
     """Smallest size of an effect that lives beside reversals and would have been found there, and what is absorbed.
 
@@ -286,7 +286,7 @@ def _beside_reversals(
         judged: the recording with all that is compared there, and the model.
         effect: the effect.
         tests: number of shapes of all candidates.
-        periods: (P, M) whitened residuals of the periods.
+        steps: (S, M) whitened steps between periods.
 
     Returns:
         The size, and the share of its power that the model absorbs.
@@ -299,9 +299,9 @@ def _beside_reversals(
     if not strength**2 > ABSORBED * power:
         return float("inf"), 1.0
     size = _needed(1, tests, settled.noise)
-    if len(periods) >= FEWEST_TO_SEARCH:
-        least = float(stats.t.isf(SCATTER_LEVEL / 2.0, step_freedom(len(periods))))
-        size = max(size, (least + POWER_QUANTILE) * spread(periods, across))
+    if len(steps) >= FEWEST_TO_SEARCH - 1:
+        least = float(stats.t.isf(SCATTER_LEVEL / 2.0, step_freedom(len(steps) + 1)))
+        size = max(size, (least + POWER_QUANTILE) * spread(steps, across))
     return size / strength, 1.0 - strength**2 / power
 
 

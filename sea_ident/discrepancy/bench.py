@@ -10,7 +10,7 @@ from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import off, span
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_periods
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_steps
 from sea_ident.discrepancy.parameter_fits import ParameterFits
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.whitening import Whitening
@@ -135,18 +135,28 @@ class Bench(ParameterFits):
         """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""
         return self._periods.residuals(fit)
 
+    def period_steps(self, fit: Fit) -> ComplexArray:
+        """(S, H + 1, E) differences of successive periods over the root of two, scaled alike: see `Periods.steps`."""
+        return self._periods.steps(fit)
+
     def period_column_changes(self, effect: TrendEffect, fit: Fit) -> ComplexArray:
         """(P, H + 1, E, k) what the columns of a trend are in every period beyond those of the mean, scaled alike."""
         return np.asarray(self._periods.column_changes(effect, fit) * fit.scale[:, None], dtype=np.complex128)
 
     def noise(self, fit: Fit) -> NoiseFloor:
-        """Noise floor with the parameters of a fit."""
-        residuals = self.period_residuals(fit)
-        noise = noise_from_periods(residuals)
+        """Noise floor of the mean with the parameters of a fit."""
+        return self._noise(fit, self.period_steps(fit), self.data.averaged)
+
+    def noise_of_cut(self, fit: Fit) -> NoiseFloor:
+        """The same by periods as they are cut, which do not close: to compare these with one another."""
+        return self._noise(fit, np.diff(self.period_residuals(fit), axis=0) / np.sqrt(2.0), self.data.periods)
+
+    def _noise(self, fit: Fit, steps: ComplexArray, periods: float) -> NoiseFloor:
+        noise = noise_from_steps(steps, periods)
         for _ in range(NOISE_ROUNDS):
             whitening = Whitening(self, noise.whitener(), self._free)
             taken = span(whitening.flat(fit.directions))
-            noise = noise_beside_model(residuals, noise, np.concatenate([whitening.free, taken], axis=1))
+            noise = noise_beside_model(steps, noise, np.concatenate([whitening.free, taken], axis=1))
         return noise
 
     @cached_property

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.discrepancy.data import EquationKind, PeriodData, mean_of_periods
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
@@ -246,14 +246,10 @@ def subset(data: PeriodData, keep: list[int]) -> PeriodData:
     """The data with some of the periods only."""
     motions = tuple(data.period_motions[p] for p in keep)
     tau = data.period_tau_motor[keep]
-    names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
-    mean = {name: np.mean([getattr(m, name) for m in motions], axis=0) for name in names}
-    motion = type(data.motion)(data.motion.time, **mean)
     places = data.places or tuple(range(data.periods))
-    return replace(
-        data, motion=motion, tau_motor=tau.mean(axis=0), period_motions=motions, period_tau_motor=tau,
-        places=tuple(places[p] for p in keep),
-    )  # fmt: skip
+    kept = tuple(places[p] for p in keep)
+    motion, mean = mean_of_periods(motions, tau, kept)
+    return replace(data, motion=motion, tau_motor=mean, period_motions=motions, period_tau_motor=tau, places=kept)
 
 
 def _currents(data: PeriodData, recording: Recording) -> FloatArray:

@@ -156,13 +156,13 @@ def _compared(
     bench: Bench, confirmed: Confirmed, temperature: FloatArray | None, notes: tuple[str, ...] = ()
 ) -> _Found:
     final = confirmed.final
-    return _Found(bench, confirmed, compare_periods(confirmed.bench, final.fit, final.noise, temperature), notes)
+    return _Found(bench, confirmed, compare_periods(confirmed.bench, final.fit, temperature), notes)
 
 
 def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
     """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
     start = settle(bench, bench.effects)
-    before = compare_periods(bench, start.fit, start.noise, temperature)
+    before = compare_periods(bench, start.fit, temperature)
     found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
     if _names(found.trends) != _names(before):
         found = _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)

@@ -13,12 +13,10 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.free_shapes import is_signal
-from sea_ident.discrepancy.judge import flat_periods
-from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import EQUALLY_GOOD, UNEXPLAINED, Trend, TrendTest, trend_excess
-from sea_ident.discrepancy.trend_directions import Cause, Direction, PeriodColumns, courses
+from sea_ident.discrepancy.trend_directions import Cause, Direction, PeriodColumns, courses, flat_periods
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.effects import Column, Contribution, Effect, Side, State
 from sea_ident.effects.drift import DriftEffect
@@ -121,19 +119,19 @@ class _Drifts:
     """
 
     def __init__(self, bench: Bench, now: Settled, temperature: FloatArray | None, effects: Sequence[Effect]) -> None:
-        periods, fit = bench.data.periods, now.fit
-        flat = flat_periods(bench, now) / np.sqrt(periods)
-        flat -= flat.mean(axis=0)
+        fit = now.fit
+        noise = bench.noise_of_cut(fit)
+        flat = flat_periods(bench, fit, noise)
         self._middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
         self.excess = trend_excess(flat, self._middle)
-        whitener, free = bench.whitener(now.noise) / np.sqrt(periods), bench.free_basis(now.noise)
-        known = PeriodColumns(bench, fit, whitener, free).causes(temperature)
+        columns = PeriodColumns(bench, fit, noise)
+        known = columns.causes(temperature)
         self._known = {cause.name: cause for cause in known}
         self._drifts = []
         for effect in effects:
             drift = Drifting(effect.joint, effect=effect)
             spectra = bench.spectra_of(drift.steady(bench.state(fit.effects)), fit.effects) * fit.scale[:, None]
-            self._drifts.append(Cause(drift, off(free, whiten(whitener, spectra)), None))
+            self._drifts.append(Cause(drift, columns.flat(spectra), None))
         self._space = column_space([*known, *self._drifts])
         numbers = flat @ self._space
         self._scatter = scatter_whitener(numbers, self._middle)

@@ -63,36 +63,35 @@ def own_torque(bench: Bench, fit: Fit, position: int) -> float:
     return float(np.max(rms / np.maximum(bench.torque_rms, 1e-300)))
 
 
-def flat_periods(bench: Bench, now: Settled) -> FloatArray:
-    """(P, M) whitened residuals of the periods, in units of the noise of their mean."""
-    whitener, free = bench.whitener(now.noise), bench.free_basis(now.noise)
-    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(now.fit)])
-    return flat - (flat @ free) @ free.T
+def flat_steps(bench: Bench, now: Settled) -> FloatArray:
+    """(S, M) whitened steps between periods over the root of two, in units of the noise of the mean of all."""
+    whitener, free = bench.whitener(now.noise) / np.sqrt(bench.data.averaged), bench.free_basis(now.noise)
+    flat = np.stack([whiten(whitener, step) for step in bench.period_steps(now.fit)])
+    return np.asarray(flat - (flat @ free) @ free.T, dtype=np.float64)
 
 
-def scatter_p(periods: FloatArray, change: FloatArray) -> float:
+def scatter_p(steps: FloatArray, change: FloatArray) -> float:
     """Probability of a change of the mean by the scatter of the periods along that very change.
 
     Noise that gathers where the change is large (friction that differs from pass to pass) is larger there than the
     noise floor, which is one for all phases of a period, says.
 
     Args:
-        periods: (P, M) whitened residuals of the periods.
+        steps: (S, M) whitened steps between periods, in units of the noise of the mean.
         change: (M,) change of the whitened mean residual.
 
     Returns:
         Probability by Student's t; 0 where there are too few periods to tell.
     """
-    if len(periods) < FEWEST_TO_SEARCH:
+    if len(steps) < FEWEST_TO_SEARCH - 1:
         return 0.0
     size = float(np.linalg.norm(change))
-    return 2.0 * float(stats.t.sf(size / max(spread(periods, change), 1e-300), step_freedom(len(periods))))
+    return 2.0 * float(stats.t.sf(size / max(spread(steps, change), 1e-300), step_freedom(len(steps) + 1)))
 
 
-def spread(periods: FloatArray, change: FloatArray) -> float:
-    """Standard deviation of the mean of the periods (P, M) along a change (M,), from one period to the next."""
-    along = periods @ change / np.linalg.norm(change)
-    return float(np.sqrt(np.mean(np.diff(along) ** 2) / 2.0 / len(periods)))
+def spread(steps: FloatArray, change: FloatArray) -> float:
+    """Standard deviation along a change (M,) by steps between periods (S, M), in the unit of the steps."""
+    return float(np.sqrt(np.mean((steps @ change) ** 2)) / np.linalg.norm(change))
 
 
 def at_a_bound(effect: Effect) -> bool:

@@ -10,6 +10,7 @@ from sea_ident.discrepancy.data import EquationKind, waveform
 from sea_ident.discrepancy.findings import Location
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, stacked, step_freedom, unstacked
+from sea_ident.discrepancy.periods import CLOSED_REACH
 
 SIGNIFICANT = 5.0
 """Locations below this z-score are not told."""
@@ -38,13 +39,13 @@ def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
             if count < 4.0:
                 continue
             variance, own = float(noise.std[e] ** 2), scatter[:, part, e]
-            if data.periods > 1:
-                variance = max(variance, float(np.mean(np.diff(own, axis=0) ** 2)) / (2.0 * data.periods))
+            if len(own):
+                variance = max(variance, float(np.mean(own**2)) / data.averaged)
             power = float(np.mean(residual[part, e] ** 2))
             z = (power / variance - 1.0) * np.sqrt(share * count / 2.0)
             # of few directions the energy has a long tail: as rare as the z-score would be of many
             directions = min(share, _filled(own, count)) * count
-            chance = stats.f.sf(power / variance, directions, directions * step_freedom(data.periods))
+            chance = stats.f.sf(power / variance, directions, directions * step_freedom(len(own) + 1))
             if z > SIGNIFICANT and chance < stats.norm.sf(SIGNIFICANT):
                 label = _label(bench, residual, e, part)
                 found.append(Location(equation.joint, label, regime, float(np.sqrt(power - variance)), float(z)))
@@ -52,14 +53,14 @@ def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
 
 
 def _filled(scatter: FloatArray, count: float) -> float:
-    """Share of the directions of this many numbers that the scatter of periods (P, ...) fills evenly [-]."""
-    return min(noise_directions(scatter), count) / count if len(scatter) > 1 and count > 0.0 else 1.0
+    """Share of the directions of this many numbers that the steps between periods (S, ...) fill evenly [-]."""
+    return min(noise_directions(scatter, CLOSED_REACH), count) / count if len(scatter) and count > 0.0 else 1.0
 
 
 def _scatter(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
-    """(P, N, E) residuals of the periods, without what the samples that are left out put into them [N m]."""
+    """(S, N, E) steps between the periods, without what the samples that are left out put into them [N m]."""
     count = len(bench.data.equations)
-    flat = np.stack([stacked(residual / fit.scale) for residual in bench.period_residuals(fit)])
+    flat = np.stack([stacked(residual / fit.scale) for residual in bench.period_steps(fit)])
     free = bench.free_basis(noise)
     if free.shape[1]:
         # the same span, not whitened: as in the residual of the mean

@@ -13,7 +13,7 @@ SMALLEST_HALF_WIDTH = 4
 """Noise is smoothed over at least this many harmonics to either side."""
 
 FEWEST_STEPS = 4
-"""Pairs of steps between periods from which on the spread of their energy is estimated: six periods, ..."""
+"""Pairs of steps without a common period from which on the spread of their energy is estimated: six periods, ..."""
 
 FILLED = 0.1
 """... and share of all directions that scatter is taken to fill where there are fewer.
@@ -31,13 +31,13 @@ class NoiseFloor:
 
     Attributes:
         covariance: (H + 1, E, E) of each real component of the mean residual [(N m)^2].
-        periods: P.
+        periods: number of periods that the mean is of.
         freedom: complex degrees of freedom of every covariance.
         total_freedom: real degrees of freedom of the whole estimate.
     """
 
     covariance: ComplexArray
-    periods: int
+    periods: float
     freedom: float
     total_freedom: float
 
@@ -71,25 +71,25 @@ def stacked(values: ComplexArray) -> FloatArray:
     return np.concatenate([values[0].real, rest.real, rest.imag])
 
 
-def noise_from_periods(residuals: ComplexArray, leverage: FloatArray | None = None) -> NoiseFloor:
+def noise_from_steps(steps: ComplexArray, periods: float, leverage: FloatArray | None = None) -> NoiseFloor:
     """Covariance of the mean residual from successive differences of the periods.
 
     Differences, and not distances from the mean, so that a drift over the recording does not count as noise.
 
     Args:
-        residuals: (P, H + 1, E) residuals of every period from its own signals.
+        steps: (S, H + 1, E) differences of the residuals of successive periods over the root of two.
+        periods: number of periods that the mean is of.
         leverage: (H + 1, E) share of the residuals that was projected out of them; none by default.
 
     Returns:
         The noise floor.
     """
-    periods, harmonics, count = residuals.shape
-    steps = np.diff(residuals, axis=0) / np.sqrt(2.0)
-    products = np.einsum("pke,pkf->kef", steps, steps.conj()) / max(periods - 1, 1)
+    number, harmonics, count = steps.shape
+    products = np.einsum("pke,pkf->kef", steps, steps.conj()) / max(number, 1)
     products[1:] /= 2.0
     products[0] = products[0].real
     # variance of a mean of squared successive differences, as degrees of freedom
-    each = step_freedom(periods)
+    each = step_freedom(number + 1)
     half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * count / each - 1.0) / 2.0)))
     half = min(half, max((harmonics - 1) // 2, 1))
     smooth = _moving_mean(products, half)
@@ -117,18 +117,24 @@ def step_freedom(periods: int) -> float:
     return 2.0 * (periods - 1) ** 2 / (3.0 * periods - 4.0) if periods > 2 else 1.0
 
 
-def noise_directions(periods: FloatArray) -> float:
-    """Number of directions that the scatter of periods (P, M) fills evenly.
+def noise_directions(steps: FloatArray, reach: int = 2) -> float:
+    """Number of directions that steps between periods fill evenly.
 
     Friction that differs from pass to pass fills a few directions only. The number is the squared trace of the noise
-    covariance over the trace of its square (Satterthwaite); the second follows from products of different steps
-    between periods, which share no noise (as in Chen and Qin, Annals of Statistics 38, 2010).
+    covariance over the trace of its square (Satterthwaite); the second follows from products of steps so far apart that
+    they share no period (as in Chen and Qin, Annals of Statistics 38, 2010).
+
+    Args:
+        steps: (S, M), in the order of their time.
+        reach: number of periods that each has a part of.
+
+    Returns:
+        The number.
     """
-    steps = np.diff(periods, axis=0) / np.sqrt(2.0)
     gram = steps @ steps.T
-    apart = gram[np.triu_indices(len(steps), 2)]
+    apart = gram[np.triu_indices(len(steps), reach)]
     if len(apart) < FEWEST_STEPS:
-        return FILLED * float(periods.shape[1])
+        return FILLED * float(steps.shape[1])
     return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2)), 1e-300))
 
 
@@ -140,14 +146,14 @@ def unstacked(values: FloatArray, equations: int) -> ComplexArray:
     return np.concatenate([first[None].astype(np.complex128), (real + 1j * imaginary).reshape(shape)])
 
 
-def noise_beside_model(residuals: ComplexArray, plain: NoiseFloor, basis: FloatArray) -> NoiseFloor:
+def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, basis: FloatArray) -> NoiseFloor:
     """Noise floor of what a fit leaves: the part of the scatter that it takes up is not in it.
 
     Friction that differs from pass to pass gathers around reversals. Samples left out and columns of friction take
     most of it up in the mean residual, so it must not count as noise of what remains.
 
     Args:
-        residuals: (P, H + 1, E) residuals of every period.
+        steps: (S, H + 1, E) differences of the residuals of successive periods over the root of two.
         plain: noise floor of the residuals as they are.
         basis: (M, r) orthonormal basis of everything that is free, whitened by `plain`.
 
@@ -155,12 +161,12 @@ def noise_beside_model(residuals: ComplexArray, plain: NoiseFloor, basis: FloatA
         The noise floor.
     """
     whitener, count = plain.whitener(), plain.equations
-    flat = np.stack([stacked(np.matmul(whitener, r[:, :, None])[:, :, 0]) for r in residuals])
+    flat = np.stack([stacked(np.matmul(whitener, r[:, :, None])[:, :, 0]) for r in steps])
     flat = flat - (flat @ basis) @ basis.T
     share = unstacked(np.sum(basis**2, axis=1), count)
     leverage = share.real.copy()
     leverage[1:] = (share[1:].real + share[1:].imag) / 2.0
-    inside = noise_from_periods(np.stack([unstacked(f, count) for f in flat]), leverage)
+    inside = noise_from_steps(np.stack([unstacked(f, count) for f in flat]), plain.periods, leverage)
     colour = np.linalg.inv(whitener)
     covariance = np.matmul(np.matmul(colour, inside.covariance), colour.conj().transpose(0, 2, 1))
     return replace(inside, covariance=covariance)

@@ -1,12 +1,12 @@
 """The periods of a recording in the light of a model."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import PeriodData, spectrum, towards_mean
+from sea_ident.discrepancy.data import FEWEST_TO_CLOSE, PeriodData, spectrum, towards
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
@@ -15,6 +15,9 @@ from sea_ident.effects.drift import TrendEffect
 
 PERIOD_SAMPLES = 2
 """Samples of a single period that its model torque is computed at, per harmonic of its motion."""
+
+CLOSED_REACH = 3
+"""Periods that a step between two that close has a part of."""
 
 
 class Periods:
@@ -32,7 +35,24 @@ class Periods:
         self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
 
     def residuals(self, fit: Fit) -> ComplexArray:
-        """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean.
+        """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""
+        targets, changes = (spectrum(part, self.data.harmonics) for part in self._deviations(fit))
+        return np.asarray(fit.scale * (fit.residual + np.moveaxis(targets - changes, 1, 0)), dtype=np.complex128)
+
+    def steps(self, fit: Fit) -> ComplexArray:
+        """(S, H + 1, E) differences between residuals of successive periods over the root of two, scaled alike.
+
+        A period cut out of a recording does not close: noise jumps at its ends, and where noise is differentiated the
+        jump is seen in all harmonics. The mean of successive periods has no part in that, for what one ends with the
+        next begins with. So every period is led over into the one before it, whose end is its beginning; its energy
+        stays the same at every phase. Few periods are taken as they are, for that costs one of them.
+        """
+        places = self.data.places or tuple(range(self.data.periods))
+        targets, changes = (spectrum(successive(part, places), self.data.harmonics) for part in self._deviations(fit))
+        return np.asarray(fit.scale * np.moveaxis(targets - changes, 1, 0), dtype=np.complex128)
+
+    def _deviations(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
+        """(N, P, E) measured torques and (N', P, E) torques of a model, in what every period differs from the mean.
 
         They are linearised over distances as small as the error of the mean: the noise of one period would carry a
         velocity across the turn of friction that the mean, P times better known, stays on one side of.
@@ -44,7 +64,7 @@ class Periods:
         own = np.concatenate(
             [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
         )
-        predicted = []
+        model = []
         for state, body_rows in self._body_rows(signals, tuple(bodies)):
             rows = body_rows @ own
             link = rows[:, : self.robot.n].copy()
@@ -58,10 +78,10 @@ class Periods:
             part = Contribution(link, motor)
             for signal in signals:
                 part = signal.shifted(self.robot, state.motion.time, part)
-            predicted.append(spectrum(data.rows(part), data.harmonics))
-        changes = (np.stack(predicted[1:]) - predicted[0]) * np.sqrt(data.periods)
-        targets = np.stack([spectrum(data.target(tau), data.harmonics) for tau in data.period_tau_motor])
-        return np.asarray(fit.scale * (fit.residual + targets - targets.mean(axis=0) - changes), dtype=np.complex128)
+            model.append(data.rows(part))
+        changes = (np.stack(model[1:], axis=1) - model[0][:, None]) * np.sqrt(data.periods)
+        targets = np.stack([data.target(tau) for tau in data.period_tau_motor], axis=1)
+        return targets - data.target(data.tau_motor)[:, None], changes
 
     def column_changes(self, effect: TrendEffect, fit: Fit) -> ComplexArray:
         """(P, H + 1, E, k) what the columns of a trend are in every period beyond those of the mean, unscaled.
@@ -90,8 +110,8 @@ class Periods:
             if len(self._period_bodies) > 3:
                 self._period_bodies.clear()
             found = []
-            mean, near = towards_mean(self.data.period_motions, 1.0 / np.sqrt(self.data.periods))
-            for motion in (mean, *near):
+            mean = self.data.motion
+            for motion in (mean, *towards(mean, self.data.period_motions, 1.0 / np.sqrt(self.data.periods))):
                 thin = corrected_motion(self.robot, signals, motion)[:: self._stride]
                 state = State(self.robot, thin, _thinned(self.data.channels, self._stride))
                 parts = [body.evaluate(state) for body in bodies]
@@ -104,6 +124,26 @@ class Periods:
                 found.append((State(self.robot, thin, state.channels), rows))
             self._period_bodies[signals] = found
         return self._period_bodies[signals]
+
+
+def successive(values: FloatArray, places: Sequence[int]) -> FloatArray:
+    """(N, S, ...) steps between successive periods (N, P, ...) over the root of two, that close where there are enough.
+
+    Args:
+        values: what every period differs by from the mean.
+        places: (P,) number of every period in the recording, rising.
+    """
+    follows = np.diff(np.asarray(places)) == 1
+    if np.count_nonzero(follows[1:] & follows[:-1]) < FEWEST_TO_CLOSE - 2:
+        return np.asarray(np.diff(values, axis=1) / np.sqrt(2.0), dtype=np.float64)
+    phase = np.arange(len(values)) / len(values)
+    turn = 2.0 / 3.0 * (np.pi * phase - 0.5 * np.sin(2.0 * np.pi * phase))
+    # a^2 - a b + b^2 = 1: steps between a period with b times the one before keep the energy of plain ones
+    before = (2.0 / np.sqrt(3.0) * np.sin(turn)).reshape(-1, *[1] * (values.ndim - 1))
+    own = np.cos(turn).reshape(before.shape) + 0.5 * before
+    closed = own * values[:, 1:] + before * values[:, :-1]
+    steps = np.diff(closed, axis=1)[:, follows[1:] & follows[:-1]]
+    return np.asarray(steps / np.sqrt(2.0), dtype=np.float64)
 
 
 def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:

@@ -13,7 +13,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
     at_a_bound,
-    flat_periods,
+    flat_steps,
     own_torque,
     penalty,
     physical,
@@ -190,7 +190,7 @@ def next_effect(
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
     ]
     accepted: list[tuple[float, Fit, float]] = []
-    periods = flat_periods(bench, now) if worth else np.zeros((0, 0))
+    steps = flat_steps(bench, now) if worth else np.zeros((0, 0))
     most, explained = 0.0, False
     refits: list[tuple[Candidate, float]] = []
     for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
@@ -203,7 +203,7 @@ def next_effect(
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
-        if p_value > FAMILY_LEVEL or not _acceptable(bench, fit, new, periods, smallest):
+        if p_value > FAMILY_LEVEL or not _acceptable(bench, fit, new, steps, smallest):
             continue
         accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
         most, explained = max(most, gain), explained or new.statistic < NEARLY_RIGHT * new.dof
@@ -230,14 +230,14 @@ def _useful(bench: Bench, fit: Fit) -> float:
     return USEFUL_SHARE if len(fit.effects) - len(bench.effects) < MANY else USEFUL_BESIDE_MANY
 
 
-def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest: FloatArray) -> bool:
+def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: FloatArray) -> bool:
     """Whether the last effect of a new fit explains enough, could be, and is neither hidden nor a matter of one pass.
 
     Args:
         bench: the recording.
         fit: without the effect.
         new: with it.
-        periods: (P, M) whitened residuals of the periods without it.
+        steps: (S, M) whitened steps between periods without it.
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
     effect = new.effects[-1]
@@ -252,7 +252,7 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, periods: FloatArray, smallest:
         smallest = np.minimum(smallest, SMALLEST_SHARE)
     if np.all(visible_changes(bench, fit, new) < smallest):
         return False
-    return scatter_p(periods, fit.whitened - new.whitened) <= SCATTER_LEVEL
+    return scatter_p(steps, fit.whitened - new.whitened) <= SCATTER_LEVEL
 
 
 def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:

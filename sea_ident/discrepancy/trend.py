@@ -10,9 +10,9 @@ from scipy.interpolate import interp1d
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.linear import off
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
-from sea_ident.discrepancy.trend_directions import Direction, Name, PeriodColumns, courses, steady_rows
+from sea_ident.discrepancy.trend_directions import Direction, Name, PeriodColumns, courses, flat_periods, steady_rows
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.discrepancy.trend_search import Chosen, alike, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import Course, course_values
@@ -101,13 +101,12 @@ class TrendTest:
     notes: tuple[str, ...] = ()
 
 
-def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: FloatArray | None = None) -> TrendTest:
+def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = None) -> TrendTest:
     """Test the residuals of the periods for a trend, and name it.
 
     Args:
         bench: the recording.
         fit: the model.
-        noise: its noise floor.
         temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
 
     Returns:
@@ -116,15 +115,11 @@ def compare_periods(bench: Bench, fit: Fit, noise: NoiseFloor, temperature: Floa
     periods = bench.data.periods
     if periods < 4:
         return TrendTest(1.0, (), False)
-    residuals = bench.period_residuals(fit)
-    whitener, free = bench.whitener(noise), bench.free_basis(noise)
-    # whitened for the residual of one period: its variance is that of the mean times the number of periods
-    flat = np.stack([whiten(whitener, residual) for residual in residuals]) / np.sqrt(periods)
-    flat = flat - (flat @ free) @ free.T
-    flat -= flat.mean(axis=0)
+    noise = bench.noise_of_cut(fit)
+    flat = flat_periods(bench, fit, noise)
     middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
     omnibus = _omnibus(flat, middle, noise)
-    columns = PeriodColumns(bench, fit, whitener / np.sqrt(periods), free)
+    columns = PeriodColumns(bench, fit, noise)
     causes = columns.causes(temperature)
     if not causes:
         return TrendTest(min(1.0, 2.0 * omnibus), (), omnibus < LEVEL)
@@ -229,7 +224,7 @@ def _omnibus(flat: FloatArray, middle: FloatArray, noise: NoiseFloor) -> float:
     along = profile @ flat / np.linalg.norm(profile)
     dof = max(int(np.count_nonzero(np.abs(along) > 0.0)), 1)
     ratio = float(along @ along) / dof
-    directions = min(noise_directions(flat), float(dof))
+    directions = min(noise_directions(np.diff(flat, axis=0)), float(dof))
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(flat))))
 
 
@@ -244,7 +239,7 @@ def _apart(first: FloatArray, later: FloatArray) -> float:
     """Probability of the distance (M,) of the first period from the mean of the later ones (P - 1, M)."""
     difference = (first - later.mean(axis=0)) / np.sqrt(1.0 + 1.0 / len(later))
     dof = max(int(np.count_nonzero(np.abs(difference) > 0.0)), 1)
-    directions = min(noise_directions(later), float(dof))
+    directions = min(noise_directions(np.diff(later, axis=0)), float(dof))
     spread = float(np.sum(np.diff(later, axis=0) ** 2)) / (2.0 * (len(later) - 1))
     ratio = float(difference @ difference) / max(spread, 1e-300)
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(later))))

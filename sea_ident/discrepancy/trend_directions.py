@@ -8,7 +8,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off, whiten
-from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.discrepancy.trend_values import bend, time_constants
 from sea_ident.effects import Contribution, Effect, effect_classes
 from sea_ident.effects.drift import TrendEffect
@@ -110,18 +110,31 @@ def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect) -> Contribution:
     return replace(rows, motor=motor)
 
 
+def flat_periods(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
+    """(P, M) residuals of periods as they are cut, whitened by the noise of one of them, without their mean."""
+    whitener, free = bench.whitener(noise) / np.sqrt(bench.data.periods), bench.free_basis(noise)
+    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(fit)])
+    flat = flat - (flat @ free) @ free.T
+    return np.asarray(flat - flat.mean(axis=0), dtype=np.float64)
+
+
 class PeriodColumns:
     """Columns of trends in the periods of a recording.
 
     Args:
         bench: the recording.
         fit: the model.
-        whitener: (H + 1, E, E) of one period.
-        free: (M, m) orthonormal basis of the samples that are left out, whitened.
+        noise: noise floor of periods as they are cut.
     """
 
-    def __init__(self, bench: Bench, fit: Fit, whitener: ComplexArray, free: FloatArray) -> None:
-        self._bench, self._fit, self._whitener, self._free = bench, fit, whitener, free
+    def __init__(self, bench: Bench, fit: Fit, noise: NoiseFloor) -> None:
+        self._bench, self._fit = bench, fit
+        self._whitener = bench.whitener(noise) / np.sqrt(bench.data.periods)
+        self._free = bench.free_basis(noise)
+
+    def flat(self, spectra: ComplexArray) -> FloatArray:
+        """(M, k) whitened columns of one period from scaled spectra (H + 1, E, k)."""
+        return off(self._free, whiten(self._whitener, spectra))
 
     def causes(self, temperature: FloatArray | None) -> list[Cause]:
         """Every trend of the library that shows in anything.
@@ -147,7 +160,7 @@ class PeriodColumns:
                 spectra = bench.spectra_of(steady_rows(bench, fit, effect), fit.effects) * fit.scale[:, None]
             except EffectError:
                 continue
-            columns = off(self._free, whiten(self._whitener, spectra))
+            columns = self.flat(spectra)
             if np.all(np.linalg.norm(columns, axis=0) > 0.0):
                 found.append(Cause(effect, columns, own))
         return found
@@ -157,7 +170,7 @@ class PeriodColumns:
         if not isinstance(cause.effect, TrendEffect):
             raise TypeError(f"{cause.effect.name} is no trend")
         changes = self._bench.period_column_changes(cause.effect, self._fit)
-        each = [cause.columns + off(self._free, whiten(self._whitener, change)) for change in changes]
+        each = [cause.columns + self.flat(change) for change in changes]
         return np.stack(each if space is None else [space.T @ columns for columns in each])
 
 

@@ -19,7 +19,7 @@ def compared(laboratory, planted, found):
     start = settle(bench, bench.effects)
     begun = bench.anchored((*start.fit.effects, make_effect(*found)), start.fit.parameters)
     now = settle_again(bench, bench.fit(begun, start.noise, start=start.fit.parameters))
-    return bench, start, now, compare_periods(bench, now.fit, now.noise)
+    return bench, start, now, compare_periods(bench, now.fit)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ DRAWS = 1000
 
 def compared(bench):
     now = settle(bench, bench.effects)
-    return compare_periods(bench, now.fit, now.noise)
+    return compare_periods(bench, now.fit)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_a_spring_that_warms_up_has_its_first_rate_and_its_time_constant(laborat
     bench = laboratory.bench(laboratory.record(planted, periods=12))
     assert bench.data.places[0] > 0
     now = settle(bench, bench.effects)
-    (trend,) = compare_periods(bench, now.fit, now.noise).trends
+    (trend,) = compare_periods(bench, now.fit).trends
     assert (trend.effect.name, trend.effect.joint, trend.alternatives) == ("stiffness_drift", "hip", ())
     assert abs(trend.values[0] + 250.0) < 3.0 * trend.stds[0] < 50.0
     assert abs(trend.effect.time_constant - 20.0) < 3.0 * trend.time_constant_std < 5.0
@@ -74,7 +74,7 @@ def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     """Half of it within two minutes: the torque that the record shows is another share of every other one."""
     bench = laboratory.bench(laboratory.record([("torque_constant_drift", "knee", [-0.25], {})], periods=16))
     now = settle(bench, bench.effects)
-    (trend,) = compare_periods(bench, now.fit, now.noise).trends
+    (trend,) = compare_periods(bench, now.fit).trends
     assert (trend.effect.name, trend.effect.joint) == ("torque_constant_drift", "knee")
     assert abs(trend.values[0] + 0.25) < 3.0 * trend.stds[0] < 0.06
 
@@ -85,7 +85,7 @@ def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(l
     data = check.subset(whole, [p for p in range(whole.periods) if p not in (0, 1, 6)])
     bench = Bench(data, laboratory.effects)
     now = settle(bench, bench.effects)
-    (trend,) = compare_periods(bench, now.fit, now.noise, check.temperatures(recording, data)).trends
+    (trend,) = compare_periods(bench, now.fit, check.temperatures(recording, data)).trends
     assert (trend.effect.name, trend.effect.joint) == ("temperature_friction", "knee")
     assert np.all(np.abs(trend.values - [0.0, -0.05]) < 3.0 * trend.stds)
     # the temperature goes the way that a drift goes by itself: nothing tells the two apart
@@ -104,7 +104,7 @@ def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch
     recording = laboratory.record([("temperature_friction", "knee", [0.0, -0.05], {})], periods=12)
     bench = laboratory.bench(recording)
     now = settle(bench, bench.effects)
-    (trend,) = compare_periods(bench, now.fit, now.noise, check.temperatures(recording, bench.data)).trends
+    (trend,) = compare_periods(bench, now.fit, check.temperatures(recording, bench.data)).trends
     assert (trend.effect.name, trend.effect.joint, trend.alternatives) == ("temperature_friction", "knee", ())
 
 
@@ -113,14 +113,14 @@ def test_what_the_library_lacks_is_not_named_by_a_part_of_it(softening, monkeypa
     bench, now = softening
     less = {name: kind for name, kind in effect_classes().items() if name != "stiffness_drift"}
     monkeypatch.setattr("sea_ident.discrepancy.trend_directions.effect_classes", lambda: less)
-    found = compare_periods(bench, now.fit, now.noise)
+    found = compare_periods(bench, now.fit)
     assert found.trends == ()
     assert found.unnamed
 
 
 def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
     bench, now = nothing_missing
-    found = compare_periods(bench, now.fit, now.noise)
+    found = compare_periods(bench, now.fit)
     assert found.p_value > 1e-3
     assert (found.trends, found.unnamed, found.notes) == ((), False, ())
 
@@ -158,7 +158,7 @@ def test_size_of_the_test_of_everything_at_once(nothing_missing):
 def test_a_drift_within_a_period_is_no_effect_of_its_own(softening):
     """Stiffness that falls all the time is lower at the end of every period: that alone lies far beyond the noise."""
     bench, now = softening
-    trends = compare_periods(bench, now.fit, now.noise).trends
+    trends = compare_periods(bench, now.fit).trends
     assert [(t.effect.name, t.effect.joint) for t in trends] == [("stiffness_drift", "hip")]
     known = within_periods(bench, now.fit, trends)
     less = Bench(replace(bench.data, known=known), bench.effects)
@@ -192,7 +192,7 @@ def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_c
     planted = [("torque_constant_drift", "hip", [0.4], {"time_constant": time_constant})]
     bench = laboratory.bench(laboratory.record(planted, periods=10))
     now = settle(bench, bench.effects)
-    found = compare_periods(bench, now.fit, now.noise)
+    found = compare_periods(bench, now.fit)
     assert found.p_value < 1e-3
     assert [(t.effect.name, t.effect.joint) for t in found.trends] == [("torque_constant_drift", "hip")] * named
     assert any("torque_constant_drift at hip" in note and "over so soon" in note for note in found.notes) is not named
