@@ -165,24 +165,23 @@ def closing_weights(places: Sequence[int], samples: int) -> FloatArray:
     """(N, P) weights of the periods in a mean that closes: each phase adds up to one.
 
     The plain mean of P periods begins with the begin of the first and ends with the end of the last; what lies between
-    them is noise, and where noise is differentiated that jump is seen in all harmonics. So every period is led over
-    into the one before it, whose end is its beginning, and the mean is that of the pairs. It is as noisy as a plain
-    mean of about half a period less. Fewer than `FEWEST_TO_CLOSE` periods, or pairs of them, are averaged as they are.
+    them is noise, and where noise is differentiated that jump is seen in all harmonics. So a period that follows none
+    is faded in, and one that none follows is faded out: what the mean ends with is then what it begins with. It is as
+    noisy as a plain mean of a third of a period less. Of few periods that would be much: fewer than `FEWEST_TO_CLOSE`
+    are averaged as they are.
 
     Args:
         places: (P,) number of every period in the recording, rising.
         samples: N of a period.
     """
-    count = len(places)
-    pairs = np.flatnonzero(np.diff(np.asarray(places)) == 1) + 1
-    if len(pairs) < FEWEST_TO_CLOSE - 1:
-        return np.full((samples, count), 1.0 / count)
-    before = np.sin(0.5 * np.pi * np.arange(samples) / samples) ** 2
-    weights = np.zeros((samples, count))
-    for p in pairs:
-        weights[:, p] += 1.0 - before
-        weights[:, p - 1] += before
-    return weights / len(pairs)
+    follows = np.diff(np.asarray(places)) == 1
+    weights = np.ones((samples, len(places)))
+    if np.count_nonzero(follows) >= FEWEST_TO_CLOSE - 1:
+        phase = np.arange(samples) / samples
+        fade = np.sin(np.pi * phase) ** 2
+        weights[:, np.concatenate([[True], ~follows])] *= np.where(phase < 0.5, fade, 1.0)[:, None]
+        weights[:, np.concatenate([~follows, [True]])] *= np.where(phase > 0.5, fade, 1.0)[:, None]
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True), dtype=np.float64)
 
 
 def mean_of_periods(motions: Sequence[Motion], tau: FloatArray, places: Sequence[int]) -> tuple[Motion, FloatArray]:

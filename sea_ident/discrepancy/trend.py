@@ -9,6 +9,7 @@ from scipy.interpolate import interp1d
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import closing_weights
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
@@ -181,7 +182,8 @@ def within_periods(
 ) -> FloatArray:
     """Torque of trends in the mean period, beyond what they do to all of its phases alike.
 
-    What drifts from period to period drifts within a period too: its end comes later than its beginning, every time.
+    What drifts from period to period drifts within a period too: its end comes later than its beginning, every time. A
+    mean that closes has little of that left, for towards its end it leads over into the periods before.
 
     Args:
         bench: the recording.
@@ -195,6 +197,7 @@ def within_periods(
     data = bench.data
     phase = (np.arange(data.samples) + 0.5) / data.samples
     time = data.starts[:, None] + phase * data.period
+    weights = closing_weights(data.places or range(data.periods), data.samples)
     total = np.zeros((data.samples, len(data.equations)))
     for trend in trends:
         if not isinstance(trend.effect, TrendEffect):
@@ -205,9 +208,9 @@ def within_periods(
             each = temperature[:, bench.robot.index(trend.effect.joint)]
             own = interp1d(middle, each, fill_value="extrapolate")(time.ravel())
         change = trend.effect.change(time.ravel(), own).reshape(time.shape)
-        course = np.mean(change - np.mean(change, axis=1, keepdims=True), axis=0)
+        course = np.einsum("tp,pt->t", weights, change)
         values = trend.effect.referred(trend.values, -float(np.mean(change)))
-        total += course[:, None] * (data.rows(steady_rows(bench, fit, trend.effect)) @ values)
+        total += (course - course.mean())[:, None] * (data.rows(steady_rows(bench, fit, trend.effect)) @ values)
     return total
 
 
