@@ -24,7 +24,7 @@ from sea_ident.discrepancy.judge import (
     too_short,
 )
 from sea_ident.discrepancy.linear import off, whiten
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, step_freedom
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, closed_freedom
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.search import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, Selection
 from sea_ident.discrepancy.settle import Settled
@@ -300,7 +300,7 @@ def _beside_reversals(
         return float("inf"), 1.0
     size = _needed(1, tests, settled.noise)
     if len(steps) >= FEWEST_TO_SEARCH - 1:
-        least = float(stats.t.isf(SCATTER_LEVEL / 2.0, step_freedom(len(steps) + 1)))
+        least = float(stats.t.isf(SCATTER_LEVEL / 2.0, closed_freedom(len(steps))))
         size = max(size, (least + POWER_QUANTILE) * spread(steps, across))
     return size / strength, 1.0 - strength**2 / power
 

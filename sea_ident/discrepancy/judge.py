@@ -8,7 +8,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, is_signal
 from sea_ident.discrepancy.linear import whiten
-from sea_ident.discrepancy.noise import NoiseFloor, step_freedom
+from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
@@ -86,7 +86,7 @@ def scatter_p(steps: FloatArray, change: FloatArray) -> float:
     if len(steps) < FEWEST_TO_SEARCH - 1:
         return 0.0
     size = float(np.linalg.norm(change))
-    return 2.0 * float(stats.t.sf(size / max(spread(steps, change), 1e-300), step_freedom(len(steps) + 1)))
+    return 2.0 * float(stats.t.sf(size / max(spread(steps, change), 1e-300), closed_freedom(len(steps))))
 
 
 def spread(steps: FloatArray, change: FloatArray) -> float:

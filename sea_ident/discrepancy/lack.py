@@ -6,8 +6,7 @@ from scipy import stats
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.gap import excess_power
 from sea_ident.discrepancy.judge import flat_steps
-from sea_ident.discrepancy.noise import noise_directions, step_freedom
-from sea_ident.discrepancy.periods import CLOSED_REACH
+from sea_ident.discrepancy.noise import closed_directions, closed_freedom
 from sea_ident.discrepancy.settle import Settled
 
 LACK_LEVEL = 1e-3
@@ -33,8 +32,8 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
         return statistic, 0, 1.0
     steps, basis = flat_steps(bench, settled), settled.fit.basis
     steps = steps - (steps @ basis) @ basis.T  # the samples that are left out are out of them already
-    directions = min(noise_directions(steps, CLOSED_REACH), float(dof))
-    freedom = directions * step_freedom(len(steps) + 1)
+    directions = min(closed_directions(steps), float(dof))
+    freedom = directions * closed_freedom(len(steps))
     return statistic, dof, float(stats.f.sf(statistic / max(dof, 1), directions, freedom))
 
 

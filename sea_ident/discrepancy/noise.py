@@ -12,14 +12,26 @@ ComplexArray = NDArray[np.complex128]
 SMALLEST_HALF_WIDTH = 4
 """Noise is smoothed over at least this many harmonics to either side."""
 
-FEWEST_STEPS = 4
+FEWEST_PAIRS = 4
 """Pairs of steps without a common period from which on the spread of their energy is estimated: six periods, ..."""
 
 FILLED = 0.1
-"""... and share of all directions that scatter is taken to fill where there are fewer.
+"""... and share of all directions that periods as they are cut are taken to fill where there are fewer.
 
 Twenty periods of legs of all kinds fill 0.10 to 0.17 of them. With all of them instead, two to five periods reject a
 model that is right in three of ten cases at a nominal twentieth; with a tenth, in 3 to 5 %."""
+
+FEWEST_CLOSED_STEPS = 5
+"""Steps between periods from which on they surely close."""
+
+CLOSED_CORRELATION = (-0.317, -0.183)
+"""Correlation of such a step with the next and with the one after it, the mean over a period."""
+
+FEWEST_CLOSED_PAIRS = 15
+"""The same of steps between periods that close: ten periods, ..."""
+
+FILLED_CLOSED = 0.4
+"""... and the share where there are fewer: twenty periods of legs fill 0.4 to 0.9 of them."""
 
 SMALLEST_REST = 0.1
 """A residual of which a model takes up more than all but this share says nothing about noise."""
@@ -117,25 +129,42 @@ def step_freedom(periods: int) -> float:
     return 2.0 * (periods - 1) ** 2 / (3.0 * periods - 4.0) if periods > 2 else 1.0
 
 
-def noise_directions(steps: FloatArray, reach: int = 2) -> float:
-    """Number of directions that steps between periods fill evenly.
+def closed_freedom(number: int) -> float:
+    """Degrees of freedom of a variance from the mean square of this many steps between periods that close.
+
+    Such a step is related less to the next than one between periods as they are cut, but to the one after it too.
+    """
+    if number < FEWEST_CLOSED_STEPS:
+        return step_freedom(number + 1)
+    related = sum((number - k) * c**2 for k, c in enumerate(CLOSED_CORRELATION, start=1))
+    return number**2 / (number + 2.0 * related)
+
+
+def noise_directions(steps: FloatArray) -> float:
+    """Number of directions that steps (S, M) between periods as they are cut fill evenly.
 
     Friction that differs from pass to pass fills a few directions only. The number is the squared trace of the noise
     covariance over the trace of its square (Satterthwaite); the second follows from products of steps so far apart that
     they share no period (as in Chen and Qin, Annals of Statistics 38, 2010).
-
-    Args:
-        steps: (S, M), in the order of their time.
-        reach: number of periods that each has a part of.
-
-    Returns:
-        The number.
     """
+    return _directions(steps, 2, FEWEST_PAIRS, FILLED)
+
+
+def closed_directions(steps: FloatArray) -> float:
+    """The same of steps between periods that close, each of which has a part of three; of few, as they are cut."""
+    if len(steps) < FEWEST_CLOSED_STEPS:
+        return noise_directions(steps)
+    return _directions(steps, 3, FEWEST_CLOSED_PAIRS, FILLED_CLOSED)
+
+
+def _directions(steps: FloatArray, reach: int, fewest: int, filled: float) -> float:
     gram = steps @ steps.T
     apart = gram[np.triu_indices(len(steps), reach)]
-    if len(apart) < FEWEST_STEPS:
-        return FILLED * float(steps.shape[1])
-    return float(np.mean(np.diag(gram)) ** 2 / max(float(np.mean(apart**2)), 1e-300))
+    if len(apart) < fewest:
+        return filled * float(steps.shape[1])
+    # few pairs may say less than there is by chance: a tail that is taken for too thin rejects models that are right
+    square = float(np.mean(apart**2)) * (1.0 + np.sqrt(2.0 / len(apart)))
+    return float(np.mean(np.diag(gram)) ** 2 / max(square, 1e-300))
 
 
 def unstacked(values: FloatArray, equations: int) -> ComplexArray:

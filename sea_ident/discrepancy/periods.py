@@ -16,9 +16,6 @@ from sea_ident.effects.drift import TrendEffect
 PERIOD_SAMPLES = 2
 """Samples of a single period that its model torque is computed at, per harmonic of its motion."""
 
-CLOSED_REACH = 3
-"""Periods that a step between two that close has a part of."""
-
 
 class Periods:
     """Evaluates models on every period; what was computed once is kept.

@@ -11,7 +11,7 @@ from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate, regimes
 from sea_ident.discrepancy.settle import Settled
 
-SIZE = 0.4
+SIZE = 0.5
 """Of the misfit [N m]."""
 
 
@@ -79,10 +79,11 @@ def test_nothing_is_told_of_what_is_within_the_scatter_of_the_periods_there(noth
     wave[:, slow, e] = SIZE * np.sqrt(2.0) * (1.0 + 2.0 * phase)
     extra = np.stack([spectrum(w, bench.data.harmonics) for w in wave])
     wrong = replace(now.fit, residual=now.fit.residual + extra.mean(axis=0))
-    own = bench.period_residuals(now.fit)
+    own = bench.period_steps(now.fit)
 
     def places(each):
-        monkeypatch.setattr(bench, "period_residuals", lambda fit: own + each * fit.scale)
+        steps = np.diff(each, axis=0)[: len(own)] / np.sqrt(2.0)
+        monkeypatch.setattr(bench, "period_steps", lambda fit: own + steps * fit.scale)
         return {(p.joint, p.equation, p.regime) for p in locate(bench, wrong, now.noise)}
 
     assert ("knee", "motor", "slow") in places(np.broadcast_to(extra.mean(axis=0), extra.shape))

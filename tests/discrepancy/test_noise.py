@@ -10,7 +10,7 @@ from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.noise import (
     noise_beside_model,
     noise_directions,
-    noise_from_periods,
+    noise_from_steps,
     stacked,
     step_freedom,
     unstacked,
@@ -30,11 +30,16 @@ def scatter(rng, periods, mixing, offset=0.0):
     return values + offset
 
 
+def steps_of(periods):
+    """Differences of successive periods over the root of two."""
+    return np.diff(periods, axis=0) / np.sqrt(2.0)
+
+
 MIXING = np.array([[1.0, 0.0, 0.0], [0.8, 0.5, 0.0], [-0.02, 0.01, 0.03]])
 
 
 def test_covariance_of_the_mean():
-    found = noise_from_periods(scatter(np.random.default_rng(1), 12, MIXING))
+    found = noise_from_steps(steps_of(scatter(np.random.default_rng(1), 12, MIXING)), 12)
     middle = np.mean(found.covariance[1:], axis=0)
     np.testing.assert_allclose(middle, MIXING @ MIXING.T / 12, atol=0.15 * np.linalg.norm(MIXING @ MIXING.T) / 12)
     # a real number for the constant, two for every harmonic
@@ -45,7 +50,7 @@ def test_covariance_of_the_mean():
 def test_a_drift_is_no_noise():
     quiet = scatter(np.random.default_rng(1), 12, MIXING)
     drift = 5.0 * np.linspace(-1.0, 1.0, 12)[:, None, None]
-    drifting, plain = noise_from_periods(quiet + drift), noise_from_periods(quiet)
+    drifting, plain = (noise_from_steps(steps_of(each), 12) for each in (quiet + drift, quiet))
     # around their mean the periods are spread by three
     assert np.all(drifting.std < 1.6 * plain.std[0] + plain.std)
     assert np.std(drift) > 3.0
@@ -56,7 +61,7 @@ def test_whitened_means_have_unit_variance(periods):
     rng, values = np.random.default_rng(2), []
     for _ in range(6):
         each = scatter(rng, periods, MIXING)
-        whitener = noise_from_periods(each).whitener()
+        whitener = noise_from_steps(steps_of(each), periods).whitener()
         values.append(stacked(np.matmul(whitener, each.mean(axis=0)[:, :, None])[:, :, 0]))
     assert np.mean(np.concatenate(values) ** 2) == pytest.approx(1.0, abs=0.12)
 
@@ -80,10 +85,10 @@ def test_a_model_that_takes_up_scatter_does_not_lower_the_floor_of_the_rest():
     """White scatter stays white however many of its directions a model takes: the rest is scaled up for them."""
     rng = np.random.default_rng(5)
     residuals = scatter(rng, 15, np.eye(3))
-    plain = noise_from_periods(residuals)
+    plain = noise_from_steps(steps_of(residuals), 15)
     size = len(stacked(residuals[0]))
     basis = np.linalg.qr(rng.standard_normal((size, size // 4)))[0]
-    beside = noise_beside_model(residuals, plain, basis)
+    beside = noise_beside_model(steps_of(residuals), plain, basis)
     assert np.mean(beside.std / plain.std) == pytest.approx(1.0, abs=0.05)
     assert beside.total_freedom == pytest.approx(0.75 * plain.total_freedom, rel=0.05)
 
@@ -92,27 +97,27 @@ def test_what_the_model_takes_up_altogether_is_not_in_its_floor():
     """A few directions that differ wildly from period to period, all of them free in the model."""
     rng = np.random.default_rng(6)
     quiet = scatter(rng, 15, np.eye(3))
-    plain = noise_from_periods(quiet)
+    plain = noise_from_steps(steps_of(quiet), 15)
     wild = rng.standard_normal((len(stacked(quiet[0])), 4))
     loud = np.stack([unstacked(stacked(r) + 30.0 * wild @ rng.standard_normal(4), 3) for r in quiet])
-    loud_floor = noise_from_periods(loud)
+    loud_floor = noise_from_steps(steps_of(loud), 15)
     whitener = loud_floor.whitener()
     flat = np.stack([stacked(np.matmul(whitener, unstacked(w, 3)[:, :, None])[:, :, 0]) for w in wild.T], axis=1)
-    beside = noise_beside_model(loud, loud_floor, np.linalg.qr(flat)[0])
+    beside = noise_beside_model(steps_of(loud), loud_floor, np.linalg.qr(flat)[0])
     assert np.all(loud_floor.std > 10.0 * plain.std)
     np.testing.assert_allclose(beside.std, plain.std, rtol=0.15)
 
 
 def test_directions_of_white_scatter_are_all():
     values = np.random.default_rng(7).standard_normal((12, 1500))
-    assert noise_directions(values) == pytest.approx(1500, rel=0.4)
+    assert noise_directions(steps_of(values)) == pytest.approx(1500, rel=0.4)
 
 
 @pytest.mark.parametrize("rank", [3, 20, 100])
 def test_directions_of_scatter_of_low_rank_are_its_rank(rank):
     rng = np.random.default_rng(8)
     span = np.linalg.qr(rng.standard_normal((1500, rank)))[0]
-    found = [noise_directions(rng.standard_normal((25, rank)) @ span.T) for _ in range(20)]
+    found = [noise_directions(steps_of(rng.standard_normal((25, rank)) @ span.T)) for _ in range(20)]
     assert np.median(found) == pytest.approx(rank, rel=0.25)
 
 
@@ -128,7 +133,7 @@ def test_size_of_the_lack_of_fit_where_steps_are_too_few_to_tell_directions(peri
         ratio = (
             periods * np.sum(np.mean(flat, axis=0) ** 2) / (np.sum(np.diff(flat, axis=0) ** 2) / 2.0 / (periods - 1))
         )
-        directions = noise_directions(flat)
+        directions = noise_directions(steps_of(flat))
         rejected.append(stats.f.sf(ratio, directions, directions * step_freedom(periods)) < 0.05)
     assert 0.005 < np.mean(rejected) < 0.09
 
@@ -163,6 +168,11 @@ def test_a_leg_that_lacks_nothing_leaves_its_noise(laboratory, nothing_missing):
         clean = np.sqrt(np.sum(np.abs(bench.clean_residual(now.fit)) ** 2, axis=0))
         np.testing.assert_array_less(clean, 1.5 * now.noise.std)
         np.testing.assert_array_less(0.5 * now.noise.std, clean)
+    # and for the low harmonics of the links, of which derived noise has least: 1300 numbers, that is to 0.04
+    low = [np.abs(unstacked(now.fit.whitened, now.noise.equations))[2:20, 1::2] ** 2 for _, now in found]
+    assert [str(equation.kind) for equation in nothing_missing[0].data.equations[1::2]] == ["link"] * 3
+    free = np.mean([now.fit.dof / len(now.fit.whitened) for _, now in found])
+    assert np.mean(low) == pytest.approx(2.0 * free, rel=0.12)
 
 
 def test_a_model_that_is_wrong_by_a_twentieth_of_the_torque_is_seen(rippled):

@@ -36,4 +36,4 @@ def test_a_planted_effect_is_fitted_within_its_own_standard_errors(rippled):
     assert len(found) == 2
     for k, planted in zip(found, (1.0, 0.5), strict=True):
         assert fit.values[k] == pytest.approx(planted, abs=4.0 * fit.std(k))
-        assert fit.std(k) < 0.05
+        assert fit.std(k) < 0.06

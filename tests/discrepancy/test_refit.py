@@ -28,9 +28,9 @@ def candidates(rippled):
     return {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
 
 
-def test_what_is_far_above_and_comes_down_slowly_is_given_up(rippled, candidates, steps):
+def test_what_is_far_above_and_comes_down_slowly_is_given_up(rippled, steps):
     bench, start, right = rippled
-    wrong = candidates["link_friction", "ankle"]
+    wrong = make_effect("torque_ripple", "knee", order=14.0)
     args = (bench, start.fit.effects, wrong, (), start.noise, start.fit.parameters)
     whole = refitted(*args)
     count = len(steps)
@@ -51,7 +51,9 @@ def test_what_is_better_is_refined_to_the_end(rippled, candidates, steps):
     steps.clear()
     assert refitted(*args, 1.01 * whole.statistic).statistic == pytest.approx(whole.statistic, rel=1e-9)
     assert steps == pytest.approx(asked)
-    assert whole.effects[-1].order == pytest.approx(4.0, abs=0.02)
+    assert whole.effects[-1].order == pytest.approx(
+        4.0, abs=3.0 * whole.std(len(whole.columns) + len(whole.free_shapes) - 1)
+    )
 
 
 def test_beginnings_that_are_worse_than_the_estimate_are_not_followed(rippled, steps):
