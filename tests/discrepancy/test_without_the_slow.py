@@ -27,13 +27,13 @@ def lingering(leg, series):
     q = motion.q.copy()
     q[:, 0] = 0.35 + 0.5 * (path - path.mean()) / np.ptp(path)
     slow = FourierSeries.fit(motion.time, q, 1 / PERIOD, 12)
-    ripple = PlantedEffect(make_effect("torque_ripple", "hip", order=19.0), np.array([0.3, 0.2]))
+    ripple = PlantedEffect(make_effect("torque_ripple", "hip", order=19.0), np.array([0.45, 0.3]))
     recording = simulate(leg, slow, periods=10, seed=5, effects=(ripple,)).recording
     data = period_data(wide_processing(recording, leg, PERIOD), leg)
     speed = data.motion.dtheta[:, 0]
     # known to its spread between the periods; up to four times that is left out anyway
     spread = np.std([m.dtheta[:, 0] for m in data.period_motions], axis=0).mean()
-    stick = 4.0 * np.sign(np.gradient(speed)) * (np.abs(speed) < 10.0 * spread)
+    stick = 7.0 * np.sign(np.gradient(speed)) * (np.abs(speed) < 10.0 * spread)
     torque = np.stack([stick, np.zeros_like(stick), np.zeros_like(stick)], axis=1)
     return replace(data, tau_motor=data.tau_motor + torque, period_tau_motor=data.period_tau_motor + torque)
 
