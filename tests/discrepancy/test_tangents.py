@@ -96,8 +96,8 @@ def test_every_shape_of_every_effect(nothing_missing, name):
     for shape in effect.shapes:
         if not shape.logarithmic:  # away from the ends of its range
             effect = replace(effect, **{shape.name: 0.7 * shape.upper + 0.3 * shape.lower})
-    # where an element of a hysteresis slips or sticks its torque has a kink: two steps of different size see two slopes;
-    # so has that of a play, but at two samples of a period
+    # where an element of a hysteresis slips or sticks its torque has a kink: two steps of different size see two slopes
+    # so has that of a play, but at few samples of a period
     compare(nothing_missing[0], [effect], {"spring_hysteresis": 0.02, "backlash": 1e-3}.get(name, 2e-4))
 
 
