@@ -23,6 +23,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
+from sea_ident.discrepancy.long_waves import long_waves
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.relatives import Unnamed, unnamed
@@ -121,7 +122,7 @@ def diagnose(
     nameless: tuple[Unnamed, ...] = ()
     if basic is None:
         drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
-        nameless = (*unnamed(bench, selection, held), *drifts)
+        nameless = (*unnamed(bench, selection, held), *long_waves(bench, selection), *drifts)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)

@@ -10,8 +10,9 @@ What depends on a signal already is not multiplied by it: friction that grows wi
 friction that grows with the speed.
 
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
-half a friction that grows with the load and half a torque constant. Where one that does all that both do fits as well
-alone, with a parameter less, the two are not what is there.
+half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
+loss less a torque constant, which is one whose sign turns with the direction. Where one that does all that both do fits
+as well alone, with a parameter less, the two are not what is there.
 """
 
 from collections.abc import Mapping, Sequence
@@ -76,7 +77,7 @@ class Growth(StrEnum):
 
 
 class Only(StrEnum):
-    """Where alone a relative acts."""
+    """Where alone a relative acts, or where it acts the other way round."""
 
     DRIVING = "only where the motor drives"
     DRIVEN = "only where the motor is driven"
@@ -84,8 +85,12 @@ class Only(StrEnum):
     BACKWARD = "only in the negative direction of motion"
     POSITIVE_LOAD = "only under a positive load"
     NEGATIVE_LOAD = "only under a negative load"
+    TURNS_DRIVEN = "the other way round where the motor is driven"
+    TURNS_BACKWARD = "the other way round in the negative direction of motion"
+    TURNS_UNDER_LOAD = "the other way round under a negative load"
 
 
+_TURNS = (Only.TURNS_DRIVEN, Only.TURNS_BACKWARD, Only.TURNS_UNDER_LOAD)
 _LOADS = (Growth.LOAD, Growth.LOAD_MAGNITUDE)
 _SPEEDS = (Growth.SPEED, Growth.SPEED_MAGNITUDE)
 
@@ -130,7 +135,7 @@ class Relative(Effect):
 
     Attributes:
         growth: what the columns are multiplied by, None where by nothing.
-        only: where alone it acts, None where everywhere.
+        only: where alone it acts or is turned, None where everywhere.
         carrier: knows the load of the joint.
         middle: position at which what grows with the position vanishes [rad] or [m].
         driver: the effect at the joint that drives it, None where it is the own.
@@ -180,14 +185,16 @@ class Relative(Effect):
         return np.abs(signal) if magnitude else np.asarray(signal, dtype=np.float64)
 
     def _there(self, load: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """(N,) one where it acts and zero elsewhere, from the load and the motor velocity."""
+        """(N,) one where it acts, minus one where turned, zero elsewhere, from the load and the motor velocity."""
         match self.only:
-            case Only.DRIVING | Only.DRIVEN:
+            case Only.DRIVING | Only.DRIVEN | Only.TURNS_DRIVEN:
                 way = load * dtheta
-            case Only.FORWARD | Only.BACKWARD:
+            case Only.FORWARD | Only.BACKWARD | Only.TURNS_BACKWARD:
                 way = dtheta
             case _:
                 way = load
+        if self.only in _TURNS:
+            return np.sign(way)
         positive = self.only in (Only.DRIVING, Only.FORWARD, Only.POSITIVE_LOAD)
         return np.asarray(way > 0.0 if positive else way < 0.0, dtype=np.float64)
 
@@ -236,7 +243,7 @@ def unnamed(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[U
 
 
 def one_sided(effect: Effect) -> tuple[Relative, ...]:
-    """An effect in one direction only, in each; none of what is no torque of a single joint in every period."""
+    """An effect in one direction only or turned in it, in each; none of what is no torque of a single joint always."""
     if effect.joint is None or is_signal(effect) or isinstance(effect, ExternalForce):
         return ()
     own = {item.name: getattr(effect, item.name) for item in fields(effect)}

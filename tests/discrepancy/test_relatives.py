@@ -110,6 +110,21 @@ def test_two_effects_that_are_one_in_one_direction(nothing_missing):
     assert "are what one effect alone does as well" in said.text
 
 
+def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
+    """Friction that grows with the load is twice a loss while the motor drives, less a torque constant."""
+    bench, start = nothing_missing
+    friction = make_effect("load_dependent_friction", "knee")
+    friction = bench.anchored((*start.fit.effects, friction), start.fit.parameters)[-1]
+    bench = with_torque(bench, (KNEE, 0.15 * friction.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0]))
+    both = [make_effect(name, "knee") for name in ("torque_constant", "directional_efficiency")]
+    selection = found(bench, *both)
+    assert [selection.final.fit.parameters[f"knee.{e.name}"] for e in both] == pytest.approx([-0.15, 0.3], rel=0.1)
+    (one,) = unnamed(bench, selection, None)
+    assert one.relative == "torque_constant the other way round where the motor is driven"
+    column = one.fit.effects[-1].columns(bench.robot)[0]
+    assert one.fit.parameters[column.name] == pytest.approx(0.15, rel=0.05)
+
+
 def test_two_effects_of_sizes_of_their_own_stay_two(nothing_missing):
     bench, start = nothing_missing
     both = [make_effect(name, "knee") for name in ("torque_constant", "load_dependent_friction")]

@@ -1,0 +1,63 @@
+"""Waves that came out as the longest that there are.
+
+Torque is added to that of a leg that has nothing but what the model has, on its motion as it was measured.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.judge import slowest
+from sea_ident.discrepancy.long_waves import long_waves
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.effects import make_effect
+
+KNEE = 1
+
+
+def ripple_found(start_bench: Bench, torque: np.ndarray, order: float) -> tuple[Bench, Selection]:
+    """What a search would give that found a ripple at the knee where a torque (N,) of its motor is not in the model."""
+    total = start_bench.data.tau_motor.copy()
+    total[:, KNEE] += torque
+    bench = Bench(replace(start_bench.data, tau_motor=total), start_bench.effects)
+    start = settle(bench, bench.effects)
+    begun = bench.anchored(
+        (*start.fit.effects, make_effect("torque_ripple", "knee", order=order)), start.fit.parameters
+    )
+    fit = bench.refine(begun, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    return bench, Selection(start, settle_again(bench, fit), 1, (0.0,))
+
+
+@pytest.fixture(scope="module")
+def angle(nothing_missing):
+    """(N,) angle of the motor from the middle of its path, and how far that is to either side [rad]."""
+    theta = nothing_missing[0].data.motion.theta[:, KNEE]
+    away = theta - 0.5 * (theta.max() + theta.min())
+    return away, float(away.max())
+
+
+def test_what_changes_along_the_path_is_no_ripple(nothing_missing, angle):
+    away, reach = angle
+    spring = 2.0 * (away / reach) + 1.0 * (away / reach) ** 2 + 0.15 * np.sin(9.0 * away)
+    bench, selection = ripple_found(nothing_missing[0], spring, 0.6)
+    assert slowest(selection.effects[0])
+    (wave,) = long_waves(bench, selection)
+    assert (wave.effect, wave.joint) == ("torque_ripple", "knee")
+    assert "nothing in a joint turns so slowly" in wave.sentence
+
+
+def test_a_wave_of_which_the_motion_shows_but_a_part_keeps_its_name(nothing_missing, angle):
+    """It ended as the longest too, but with nothing left beside it."""
+    bench, selection = ripple_found(nothing_missing[0], np.sin(angle[0] + 0.4), 0.5)
+    assert slowest(selection.effects[0])
+    assert long_waves(bench, selection) == ()
+
+
+def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_missing, angle):
+    away, reach = angle
+    bench, selection = ripple_found(nothing_missing[0], np.sin(12.0 * away) + (away / reach) ** 2, 12.0)
+    assert selection.final.fit.statistic > 2.0 * selection.final.fit.dof
+    assert long_waves(bench, selection) == ()
