@@ -40,7 +40,7 @@ def long_waves(bench: Bench, selection: Selection) -> tuple[LongWave, ...]:
         One entry for every such wave.
     """
     fit = selection.final.fit
-    waves = [effect for effect in selection.effects ]
+    waves = [effect for effect in selection.effects if slowest(effect)]
     if not waves or lack_of_fit(bench, selection.final)[2] >= LACK_LEVEL:
         return ()
     relative = "less than a wave in a turn"
