@@ -63,7 +63,7 @@ def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
 
 
 def with_what_it_misses(model: Model, processed: ProcessedRecording, fit: Fit) -> Model:
-    """A model with what the fit of a diagnosis tells of its bodies, of friction at its links and of what it hardly sees.
+    """A model with what the fit of a diagnosis tells of bodies, of friction at links and of what the model hardly sees.
 
     Both know the torques of the motors, so that what both see of a motor is not put together: it would count twice.
 
