@@ -23,7 +23,6 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
-from sea_ident.discrepancy.long_waves import long_waves
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.relatives import Unnamed, unnamed
@@ -31,6 +30,7 @@ from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
@@ -122,7 +122,8 @@ def diagnose(
     nameless: tuple[Unnamed, ...] = ()
     if basic is None:
         drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
-        nameless = (*unnamed(bench, selection, held), *long_waves(bench, selection), *drifts)
+        away = (confirmed.bench, confirmed.final)
+        nameless = (*unnamed(bench, selection, held, away), *stand_ins(bench, selection), *drifts)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)

@@ -219,19 +219,23 @@ def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple
     )
 
 
-def unnamed(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
+def unnamed(
+    bench: Bench, selection: Selection, held: HeldOut | None, away: tuple[Bench, Settled] | None = None
+) -> tuple[Unnamed, ...]:
     """Effects that were found in the place of which a relative explains the recording much better.
 
     Args:
         bench: the recording.
         selection: what was found.
         held: data that were not used; what a relative explains must hold on another motion too.
+        away: the recording with more left out around the reversals, and the model with what was found there: whether
+            one effect does what two do is told where the sign of friction is known; the recording itself by default.
 
     Returns:
         One entry for every such effect, with its best relative.
     """
     now = selection.final
-    pairs = _one_for_two(bench, selection, held)
+    pairs = _one_for_two(*(away or (bench, now)), selection, held)
     if not selection.added or lack_of_fit(bench, now)[2] >= LACK_LEVEL:
         return pairs
     first, found = len(now.fit.effects) - selection.added, []
@@ -251,9 +255,9 @@ def one_sided(effect: Effect) -> tuple[Relative, ...]:
     return tuple(kind(**own, only=only, carrier=carrier) for only in Only)
 
 
-def _one_for_two(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
+def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
     """Pairs of effects that were found at one joint where one alone, in one direction, does as well as both."""
-    fit, noise = selection.final.fit, selection.final.noise
+    fit, noise = now.fit, now.noise
     first = len(fit.effects) - selection.added
     found = []
     for one, other in combinations(range(first, len(fit.effects)), 2):
