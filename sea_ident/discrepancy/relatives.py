@@ -12,7 +12,8 @@ friction that grows with the speed.
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
 loss less a torque constant, which is one whose sign turns with the direction. Where one that does all that both do fits
-as well alone, with a parameter less, the two are not what is there.
+as well alone, with a parameter less, the two are not what is there. An encoder that errs at a joint and a torque of its
+motor that changes along the path are together a torque on the link: the same effect there is asked too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +21,7 @@ from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
 from itertools import combinations
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -199,6 +200,16 @@ class Relative(Effect):
         return np.asarray(way > 0.0 if positive else way < 0.0, dtype=np.float64)
 
 
+class BehindTheSpring(JointEffect):
+    """An effect of a motor where it acts on the link instead, which is its other base class."""
+
+    side: ClassVar[Side] = Side.LINK
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """Those of the effect, of the state of the link."""
+        return super().local_columns(q, dq, q, dq)  # type: ignore[safe-super]
+
+
 def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple[Relative, ...]:
     """All relatives of an effect of a model; none of what is no torque of a single joint in every period."""
     if effect.joint is None or is_signal(effect) or isinstance(effect, ExternalForce):
@@ -255,16 +266,28 @@ def one_sided(effect: Effect) -> tuple[Relative, ...]:
     return tuple(kind(**own, only=only, carrier=carrier) for only in Only)
 
 
+def behind_the_spring(bench: Bench, effect: Effect) -> tuple[Effect, ...]:
+    """An effect of the motor where it acts on the link instead; none of what is no torque of a joint with a spring."""
+    if not isinstance(effect, JointEffect) or effect.side is not Side.MOTOR:
+        return ()
+    if bench.robot.index(effect.required_joint) not in bench.robot.elastic_indices:
+        return ()
+    own = {item.name: getattr(effect, item.name) for item in fields(effect)}
+    return (_behind(type(effect))(**own),)
+
+
 def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
-    """Pairs of effects that were found at one joint where one alone, in one direction, does as well as both."""
+    """Pairs of effects that were found at one joint where one alone does as well as both."""
     fit, noise = now.fit, now.noise
     first = len(fit.effects) - selection.added
     found = []
     for one, other in combinations(range(first, len(fit.effects)), 2):
         own, second = fit.effects[one], fit.effects[other]
-        if own.joint != second.joint or own.side is not second.side:
+        if own.joint != second.joint:
             continue
-        family = (*one_sided(own), *one_sided(second))
+        family: tuple[Effect, ...] = (*behind_the_spring(bench, own), *behind_the_spring(bench, second))
+        if own.side is second.side:
+            family = (*one_sided(own), *one_sided(second), *family)
         if not family:
             continue
         others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
@@ -329,6 +352,8 @@ def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
 
 def _in_words(candidate: Candidate) -> str:
     relative = candidate.effect
+    if isinstance(relative, BehindTheSpring):
+        return f"{relative.name} on the link"
     if isinstance(relative, Relative) and relative.only is not None:
         return f"{relative.name} {relative.only}"
     if isinstance(relative, Relative) and relative.growth is not None:
@@ -377,3 +402,9 @@ def _moved(rows: FloatArray, source: int, target: int) -> FloatArray:
 def _related(form: type[Effect]) -> type[Relative]:
     """The class of the relatives of an effect: they have its shapes, and are refined as it is."""
     return dataclass(frozen=True)(type(f"RelativeOf{form.__name__}", (Relative, form), {}))
+
+
+@cache
+def _behind(form: type[JointEffect]) -> type[JointEffect]:
+    """The class of the same effect on the link."""
+    return dataclass(frozen=True)(type(f"{form.__name__}BehindTheSpring", (BehindTheSpring, form), {}))
