@@ -58,8 +58,12 @@ GOES = 0.5
 STAYS = 0.3
 """... and share of that shrink below which it does not [-]."""
 
-UNEXPLAINED = 0.5
-"""Share of the excess from which on the effects found are no explanation of it [-]."""
+UNEXPLAINED = 0.25
+"""Share of the excess from which on the effects found are no explanation of it [-]: as large as an effect by itself,
+half as large in torque as what was there, and nothing of the library does that, ..."""
+
+UNEXPLAINED_BY_FRICTION = 0.5
+"""... and the same beside a friction that the model did not have at all [-]."""
 
 
 def conclude(
@@ -230,7 +234,8 @@ def verdict_of(
     nameless = remainder > WORTH_A_NAME and not basic
     # what drifts is in the mean too, where all that changes is known
     drifts = bool(trends.trends) and not trends.unnamed
-    if large and (unexplained > UNEXPLAINED or nameless) and not drifts:
+    unlike = unexplained > (UNEXPLAINED_BY_FRICTION if basic else UNEXPLAINED)
+    if large and (unlike or nameless) and not drifts:
         return Verdict.NOT_IN_LIBRARY
     if any(m.alternatives for m in structural):
         return Verdict.AMBIGUOUS

@@ -30,6 +30,7 @@ from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
@@ -121,7 +122,8 @@ def diagnose(
     nameless: tuple[Unnamed, ...] = ()
     if basic is None:
         drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
-        nameless = (*unnamed(bench, selection, held), *drifts)
+        away = (confirmed.bench, confirmed.final)
+        nameless = (*unnamed(bench, selection, held, away), *stand_ins(bench, selection), *drifts)
     change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)

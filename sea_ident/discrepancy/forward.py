@@ -12,6 +12,9 @@ controller, one that is wrong also goes wrong by as much as it would in the robo
 What is measured is noisy. Its noise cancels in the product of deviations that have none of it in common: those of
 different periods from a simulation that is driven by a reference, or those of two simulations, each driven by one half
 of the periods and compared with that half.
+
+Where a spring with dry friction rests follows from how it was loaded before the recording began: a constant deflection
+that no periodic motion tells. At joints with such a spring the mean of q is not compared, before nor after.
 """
 
 import warnings as python_warnings
@@ -24,6 +27,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import corrected_motion
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion
@@ -192,6 +196,11 @@ def simulation_gap(
             return SimulationGap({}, tuple(notes))
         deviations.append([deviations_of(run, part, len(parts) > 1) for run, part in zip(runs, parts, strict=True)])
     names = before.robot.joint_names
+    remembering = [
+        names.index(effect.required_joint) for effect in after.spring_effects if isinstance(effect, SpringHysteresis)
+    ]
+    for part in (part for model in deviations for part in model):
+        part["q"][..., remembering] -= part["q"][..., remembering].mean(axis=1, keepdims=True)
     gaps, unseen = {}, {}
     for kind in SIGNALS:
         both = [np.concatenate([part[kind] for part in model]) for model in deviations]

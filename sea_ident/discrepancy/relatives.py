@@ -10,8 +10,10 @@ What depends on a signal already is not multiplied by it: friction that grows wi
 friction that grows with the speed.
 
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
-half a friction that grows with the load and half a torque constant. Where one that does all that both do fits as well
-alone, with a parameter less, the two are not what is there.
+half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
+loss less a torque constant, which is one whose sign turns with the direction. Where one that does all that both do fits
+as well alone, with a parameter less, the two are not what is there. An encoder that errs at a joint and a torque of its
+motor that changes along the path are together a torque on the link: the same effect there is asked too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +21,7 @@ from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
 from itertools import combinations
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -76,7 +78,7 @@ class Growth(StrEnum):
 
 
 class Only(StrEnum):
-    """Where alone a relative acts."""
+    """Where alone a relative acts, or where it acts the other way round."""
 
     DRIVING = "only where the motor drives"
     DRIVEN = "only where the motor is driven"
@@ -84,8 +86,12 @@ class Only(StrEnum):
     BACKWARD = "only in the negative direction of motion"
     POSITIVE_LOAD = "only under a positive load"
     NEGATIVE_LOAD = "only under a negative load"
+    TURNS_DRIVEN = "the other way round where the motor is driven"
+    TURNS_BACKWARD = "the other way round in the negative direction of motion"
+    TURNS_UNDER_LOAD = "the other way round under a negative load"
 
 
+_TURNS = (Only.TURNS_DRIVEN, Only.TURNS_BACKWARD, Only.TURNS_UNDER_LOAD)
 _LOADS = (Growth.LOAD, Growth.LOAD_MAGNITUDE)
 _SPEEDS = (Growth.SPEED, Growth.SPEED_MAGNITUDE)
 
@@ -130,7 +136,7 @@ class Relative(Effect):
 
     Attributes:
         growth: what the columns are multiplied by, None where by nothing.
-        only: where alone it acts, None where everywhere.
+        only: where alone it acts or is turned, None where everywhere.
         carrier: knows the load of the joint.
         middle: position at which what grows with the position vanishes [rad] or [m].
         driver: the effect at the joint that drives it, None where it is the own.
@@ -180,16 +186,28 @@ class Relative(Effect):
         return np.abs(signal) if magnitude else np.asarray(signal, dtype=np.float64)
 
     def _there(self, load: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """(N,) one where it acts and zero elsewhere, from the load and the motor velocity."""
+        """(N,) one where it acts, minus one where turned, zero elsewhere, from the load and the motor velocity."""
         match self.only:
-            case Only.DRIVING | Only.DRIVEN:
+            case Only.DRIVING | Only.DRIVEN | Only.TURNS_DRIVEN:
                 way = load * dtheta
-            case Only.FORWARD | Only.BACKWARD:
+            case Only.FORWARD | Only.BACKWARD | Only.TURNS_BACKWARD:
                 way = dtheta
             case _:
                 way = load
+        if self.only in _TURNS:
+            return np.sign(way)
         positive = self.only in (Only.DRIVING, Only.FORWARD, Only.POSITIVE_LOAD)
         return np.asarray(way > 0.0 if positive else way < 0.0, dtype=np.float64)
+
+
+class BehindTheSpring(JointEffect):
+    """An effect of a motor where it acts on the link instead, which is its other base class."""
+
+    side: ClassVar[Side] = Side.LINK
+
+    def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """Those of the effect, of the state of the link."""
+        return super().local_columns(q, dq, q, dq)  # type: ignore[safe-super]
 
 
 def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple[Relative, ...]:
@@ -212,19 +230,23 @@ def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple
     )
 
 
-def unnamed(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
+def unnamed(
+    bench: Bench, selection: Selection, held: HeldOut | None, away: tuple[Bench, Settled] | None = None
+) -> tuple[Unnamed, ...]:
     """Effects that were found in the place of which a relative explains the recording much better.
 
     Args:
         bench: the recording.
         selection: what was found.
         held: data that were not used; what a relative explains must hold on another motion too.
+        away: the recording with more left out around the reversals, and the model with what was found there: whether
+            one effect does what two do is told where the sign of friction is known; the recording itself by default.
 
     Returns:
         One entry for every such effect, with its best relative.
     """
     now = selection.final
-    pairs = _one_for_two(bench, selection, held)
+    pairs = _one_for_two(*(away or (bench, now)), selection, held)
     if not selection.added or lack_of_fit(bench, now)[2] >= LACK_LEVEL:
         return pairs
     first, found = len(now.fit.effects) - selection.added, []
@@ -236,7 +258,7 @@ def unnamed(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[U
 
 
 def one_sided(effect: Effect) -> tuple[Relative, ...]:
-    """An effect in one direction only, in each; none of what is no torque of a single joint in every period."""
+    """An effect in one direction only or turned in it, in each; none of what is no torque of a single joint always."""
     if effect.joint is None or is_signal(effect) or isinstance(effect, ExternalForce):
         return ()
     own = {item.name: getattr(effect, item.name) for item in fields(effect)}
@@ -244,16 +266,28 @@ def one_sided(effect: Effect) -> tuple[Relative, ...]:
     return tuple(kind(**own, only=only, carrier=carrier) for only in Only)
 
 
-def _one_for_two(bench: Bench, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
-    """Pairs of effects that were found at one joint where one alone, in one direction, does as well as both."""
-    fit, noise = selection.final.fit, selection.final.noise
+def behind_the_spring(bench: Bench, effect: Effect) -> tuple[Effect, ...]:
+    """An effect of the motor where it acts on the link instead; none of what is no torque of a joint with a spring."""
+    if not isinstance(effect, JointEffect) or effect.side is not Side.MOTOR:
+        return ()
+    if bench.robot.index(effect.required_joint) not in bench.robot.elastic_indices:
+        return ()
+    own = {item.name: getattr(effect, item.name) for item in fields(effect)}
+    return (_behind(type(effect))(**own),)
+
+
+def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
+    """Pairs of effects that were found at one joint where one alone does as well as both."""
+    fit, noise = now.fit, now.noise
     first = len(fit.effects) - selection.added
     found = []
     for one, other in combinations(range(first, len(fit.effects)), 2):
         own, second = fit.effects[one], fit.effects[other]
-        if own.joint != second.joint or own.side is not second.side:
+        if own.joint != second.joint:
             continue
-        family = (*one_sided(own), *one_sided(second))
+        family: tuple[Effect, ...] = (*behind_the_spring(bench, own), *behind_the_spring(bench, second))
+        if own.side is second.side:
+            family = (*one_sided(own), *one_sided(second), *family)
         if not family:
             continue
         others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
@@ -318,6 +352,8 @@ def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
 
 def _in_words(candidate: Candidate) -> str:
     relative = candidate.effect
+    if isinstance(relative, BehindTheSpring):
+        return f"{relative.name} on the link"
     if isinstance(relative, Relative) and relative.only is not None:
         return f"{relative.name} {relative.only}"
     if isinstance(relative, Relative) and relative.growth is not None:
@@ -366,3 +402,9 @@ def _moved(rows: FloatArray, source: int, target: int) -> FloatArray:
 def _related(form: type[Effect]) -> type[Relative]:
     """The class of the relatives of an effect: they have its shapes, and are refined as it is."""
     return dataclass(frozen=True)(type(f"RelativeOf{form.__name__}", (Relative, form), {}))
+
+
+@cache
+def _behind(form: type[JointEffect]) -> type[JointEffect]:
+    """The class of the same effect on the link."""
+    return dataclass(frozen=True)(type(f"{form.__name__}BehindTheSpring", (BehindTheSpring, form), {}))

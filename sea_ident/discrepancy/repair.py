@@ -17,13 +17,17 @@ from sea_ident.processing import ProcessedRecording
 OPEN = 0.5
 """Standard deviation, in logarithms or in shares of its range, from which on a recording leaves a shape open [-]."""
 
+BLIND = 5.0
+"""Times the standard deviation in the fit beyond which that of the model says that it does not see a parameter [-]."""
+
 
 def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Model | None:
     """The model identified anew with the effects that were found; None where that is not possible.
 
-    `identify` weighs the sum of both equations of a joint sample by sample. What a link equation tells, without any
-    noise of torque, is in the fit of the diagnosis: both are put together, weighted by their covariances. A shape that
-    the recording leaves open stays as the model had it.
+    `identify` weighs the sum of both equations of a joint sample by sample, without those beside a reversal. What a
+    link equation tells, without any noise of torque, and what a friction does that falls within these samples is in
+    the fit of the diagnosis: both are put together, weighted by their covariances. A shape that the recording leaves
+    open stays as the model had it.
 
     Args:
         model: the model that was diagnosed.
@@ -41,7 +45,7 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
     try:
         with python_warnings.catch_warnings():
             python_warnings.simplefilter("ignore", SeaIdentWarning)
-            return with_link_equations(identify(model.robot, processed, effects=effects), processed, fit)
+            return with_what_it_misses(identify(model.robot, processed, effects=effects), processed, fit)
     except SeaIdentError:
         return None
 
@@ -58,8 +62,10 @@ def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(effects)
 
 
-def with_link_equations(model: Model, processed: ProcessedRecording, fit: Fit) -> Model:
-    """A model with what the fit of a diagnosis tells of its bodies and of friction at its links.
+def with_what_it_misses(model: Model, processed: ProcessedRecording, fit: Fit) -> Model:
+    """A model with what the fit of a diagnosis tells of bodies, of friction at links and of what the model hardly sees.
+
+    Both know the torques of the motors, so that what both see of a motor is not put together: it would count twice.
 
     Args:
         model: identified from the motor torques.
@@ -67,16 +73,22 @@ def with_link_equations(model: Model, processed: ProcessedRecording, fit: Fit) -
         fit: to link and motor equations of the same recording, with the same parameters.
 
     Returns:
-        The model; as it is where it has no springs, and so no link equations.
+        The model; as it is where the fit tells nothing more.
     """
     base, columns = model.base, [column.name for column in fit.columns]
     names = [column.name for column in base.columns]
-    if not model.robot.elastic_indices.size or not set(names) <= set(columns):
+    if not set(names) <= set(columns):
         return model
     rows = [columns.index(name) for name in names]
     factor = base.grouping @ fit.covariance_factor[rows]
-    told = [k for k, i in enumerate(base.independent) if base.columns[i].side is not Side.MOTOR]
-    own, other = regular_covariance(model), factor[told] @ factor[told].T
+    own = regular_covariance(model)
+    blind = np.sqrt(np.diag(own)) > BLIND * np.linalg.norm(factor, axis=1)
+    linked = model.robot.elastic_indices.size > 0
+    sides = [base.columns[i].side for i in base.independent]
+    told = [k for k, side in enumerate(sides) if blind[k] or (linked and side is not Side.MOTOR)]
+    if not told:
+        return model
+    other = factor[told] @ factor[told].T
     gain = own[:, told] @ np.linalg.inv(own[np.ix_(told, told)] + other)
     values = model.values + gain @ ((base.grouping @ fit.values[rows])[told] - model.values[told])
     left = np.eye(len(values))

@@ -22,6 +22,7 @@ from sea_ident.effects.base import (
     Side,
     State,
     corrected_motion,
+    measured_signals,
     smooth_sign,
 )
 from sea_ident.exceptions import EffectError
@@ -43,6 +44,7 @@ __all__ = [
     "effect_classes",
     "effect_from_dict",
     "make_effect",
+    "measured_signals",
     "smooth_sign",
     "spring_effects",
 ]

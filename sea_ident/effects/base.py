@@ -208,6 +208,8 @@ class Effect(ABC):
     side: ClassVar[Side]
     source: ClassVar[str]
     shapes: ClassVar[tuple[Shape, ...]] = ()
+    depth: ClassVar[int] = 0
+    """Place on the way from what is recorded to the bodies: an encoder errs before the link bends behind it."""
 
     @abstractmethod
     def columns(self, robot: Robot) -> tuple[Column, ...]:
@@ -378,10 +380,24 @@ class JointEffect(Effect):
 
 
 def corrected_motion(robot: Robot, effects: Sequence[Effect], motion: Motion) -> Motion:
-    """The motion with the errors of all sensors taken out that the effects of a model describe."""
-    for effect in effects:
+    """The motion with the errors of all sensors taken out that the effects of a model describe, in whatever order."""
+    for effect in sorted(effects, key=_depth):
         motion = effect.corrected(robot, motion)
     return motion
+
+
+def measured_signals(
+    robot: Robot, effects: Sequence[Effect], time: FloatArray, signals: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """The signals as recorded, with all that the effects do to them: the way back of `corrected_motion`."""
+    shown = dict(signals)
+    for effect in reversed(sorted(effects, key=_depth)):
+        shown = effect.measured(robot, time, shown)
+    return shown
+
+
+def _depth(effect: Effect) -> int:
+    return effect.depth
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

@@ -40,6 +40,7 @@ class LinkFlexibility(SignalEffect):
     cubic_stiffness: float | None = None
 
     name: ClassVar[str] = "link_flexibility"
+    depth: ClassVar[int] = 1
     source: ClassVar[str] = "Wernholt, Moberg, Nonlinear gray-box identification using local models, Automatica 2011"
     amounts: ClassVar[tuple[Shape, ...]] = (Shape("compliance", "rad/(N m)", 0.0, 0.01, logarithmic=False),)
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect
+from sea_ident.effects import measured_signals
 from sea_ident.exceptions import SimulationError
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.recordings import Recording
@@ -159,8 +160,7 @@ def simulate(
     signals = {"q": motion.q, "theta": motion.theta, "tau_motor": tau_motor, "tau_spring": tau_spring}
     if warm_up is not None:
         signals["temperature"] = warm_up.at(motion.time, robot.n)
-    for each in effects:
-        signals = each.effect.measured(plant.robot, motion.time, signals)
+    signals = measured_signals(plant.robot, [each.effect for each in effects], motion.time, signals)
     columns = sensed_columns(plant, motion.time, motion.dtheta, signals, sensors or SensorNoise(), streams[1])
     reference_motion = _sampled(drive.reference, motion.time, clock, len(method.nodes))
     for i, joint in enumerate(robot.joints):

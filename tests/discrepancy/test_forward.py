@@ -79,3 +79,21 @@ def test_what_is_within_the_noise_is_no_gap_and_it_is_said(leg, series):
     assert set(found.gaps["q"].before.values()) == {0.0}
     assert found.gaps["q"].summary().count("within the noise") == leg.n
     assert "nothing can be said" in found.notes[-1]
+
+
+def test_where_a_spring_with_dry_friction_rests_is_no_gap(leg, series):
+    """It was loaded otherwise before the recording began: a constant in q that no model of the motion can tell."""
+    effect = make_effect("spring_hysteresis", "knee", slip=0.005)
+    planted = [PlantedEffect(effect, np.array([0.8, 0.8]))]
+    training, other = (exact(leg, each, planted) for each in series)
+    models = [
+        identify(leg, training, effects=effects, period=PERIOD)
+        for effects in (base_effects(leg), (*base_effects(leg), effect))
+    ]
+    shifted = {f"q_{name}": other.columns[f"q_{name}"] + 5e-4 for name in ("knee", "ankle")}
+    moved = replace(other, columns={**other.columns, **shifted})
+    gap = simulation_gap(*models, moved, wide_processing(moved, leg, PERIOD)).gaps["q"]
+    assert gap.before["knee"] > 1e-4
+    assert gap.after["knee"] < 0.2 * gap.before["knee"]
+    # at a joint without such a spring it is a gap
+    assert gap.after["ankle"] == pytest.approx(5e-4, rel=0.1)

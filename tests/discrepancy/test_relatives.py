@@ -110,6 +110,52 @@ def test_two_effects_that_are_one_in_one_direction(nothing_missing):
     assert "are what one effect alone does as well" in said.text
 
 
+def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
+    """Friction that grows with the load is twice a loss while the motor drives, less a torque constant."""
+    bench, start = nothing_missing
+    friction = make_effect("load_dependent_friction", "knee")
+    friction = bench.anchored((*start.fit.effects, friction), start.fit.parameters)[-1]
+    bench = with_torque(bench, (KNEE, 0.15 * friction.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0]))
+    both = [make_effect(name, "knee") for name in ("torque_constant", "directional_efficiency")]
+    selection = found(bench, *both)
+    assert [selection.final.fit.parameters[f"knee.{e.name}"] for e in both] == pytest.approx([-0.15, 0.3], rel=0.1)
+    (one,) = unnamed(bench, selection, None)
+    assert one.relative == "torque_constant the other way round where the motor is driven"
+    column = one.fit.effects[-1].columns(bench.robot)[0]
+    assert one.fit.parameters[column.name] == pytest.approx(0.15, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("planted", "said"),
+    [
+        ([("parallel_spring", "knee", (6.0, 1.0), {})], ["torque_ripple on the link"]),
+        (
+            [("torque_ripple", "knee", (0.8, 0.3), {"order": 9.0}),
+             ("encoder_eccentricity", "knee", (), {"sine": 0.01, "cosine": 0.006})],
+            [],
+        ),
+    ],
+)  # fmt: skip
+def test_an_encoder_that_errs_and_a_ripple_are_a_torque_on_the_link(laboratory, planted, said):
+    bench = laboratory.bench(laboratory.record(planted))
+    order = 9.0 if not said else 1.0
+    both = [make_effect("torque_ripple", "knee", order=order), make_effect("encoder_eccentricity", "knee")]
+    assert [one.relative for one in unnamed(bench, found(bench, *both), None)] == said
+
+
+def test_one_for_two_is_told_where_the_sign_of_friction_is_known(nothing_missing):
+    """With samples beside reversals the two have sizes of their own, for there friction is not what a model says."""
+    bench, start = nothing_missing
+    both = [make_effect(name, "knee") for name in ("torque_constant", "load_dependent_friction")]
+    anchored = bench.anchored((*start.fit.effects, *both), start.fit.parameters)[-2:]
+    rows = [e.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0] for e in anchored]
+    whole, far = (with_torque(bench, (KNEE, 0.1 * rows[0] + size * rows[1])) for size in (0.13, 0.1))
+    selection = found(whole, *both)
+    assert unnamed(whole, selection, None) == ()
+    (one,) = unnamed(whole, selection, None, (far, settle_again(far, selection.final.fit)))
+    assert one.relative.endswith("only where the motor drives")
+
+
 def test_two_effects_of_sizes_of_their_own_stay_two(nothing_missing):
     bench, start = nothing_missing
     both = [make_effect(name, "knee") for name in ("torque_constant", "load_dependent_friction")]

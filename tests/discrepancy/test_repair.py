@@ -105,3 +105,21 @@ def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(leg,
     truth = plant_from_robot(leg)
     for i, name in enumerate(leg.joint_names):
         assert springs[name].stiffness == pytest.approx(truth.stiffness[i], rel=0.01)
+
+
+def test_friction_that_acts_only_beside_reversals_comes_from_the_diagnosis(leg, series):
+    """`identify` leaves out what is slower than twice the smoothing of the sign, and sees only its tail beyond."""
+    effect = planted("stribeck_friction", "knee", [0.8], speed=0.05, exponent=2.0)
+    recording = simulate(leg, series[0], periods=12, seed=70, effects=[effect]).recording
+    effects = (*base_effects(leg), effect.effect)
+    from_sum = identified(leg, recording, effects=effects)
+    bench = Bench(period_data(wide_processing(recording, leg, PERIOD), leg), (*effects, *spring_effects(leg)))
+    fit = settle(bench, bench.effects).fit
+    repaired = repaired_model(from_sum, process(recording, leg, period=PERIOD), fit)
+    alone, both = ({p.name: p for p in model.parameters} for model in (from_sum, repaired))
+    name = "knee.stribeck_friction"
+    assert abs(alone[name].value - 0.8) > 8.0
+    assert abs(both[name].value - 0.8) < min(0.4, both[name].std)
+    assert both[name].std < 0.05 * alone[name].std
+    # what both see of a motor counts once
+    assert both["hip.coulomb_friction"].std > 0.9 * alone["hip.coulomb_friction"].std

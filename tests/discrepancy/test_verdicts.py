@@ -146,7 +146,9 @@ def test_every_verdict_follows_from_findings():
     offset, friction = (replace(effect, effect=name) for name in ("torque_offset", "coulomb_friction"))
     assert verdict([friction, offset], remainder=0.011) is Verdict.NAMED_WITH_REMAINDER
     assert verdict([offset], remainder=0.011) is Verdict.NOT_IN_LIBRARY
-    assert verdict([effect], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
+    assert verdict([friction], remainder=0.011, unexplained=0.3) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([effect], remainder=0.01, unexplained=0.3) is Verdict.NOT_IN_LIBRARY
+    assert verdict([effect], remainder=0.01, unexplained=0.2) is Verdict.NAMED_WITH_REMAINDER
     # what drifts is in the mean too, but not where the periods show more than what was named
     assert verdict([effect], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.NAMED_WITH_REMAINDER
     assert verdict([effect], remainder=0.01, unexplained=0.6, trends=LeavesAnother) is Verdict.NOT_IN_LIBRARY

@@ -13,9 +13,11 @@ from sea_ident.effects import (
     SimulationState,
     State,
     base_effects,
+    corrected_motion,
     effect_classes,
     effect_from_dict,
     make_effect,
+    measured_signals,
     spring_effects,
 )
 from sea_ident.effects.signal import SignalEffect
@@ -177,6 +179,22 @@ def test_a_sensor_effect_changes_what_is_seen_and_can_be_taken_out(name, leg):
         shown = replace(motion, q=seen["q"], theta=seen["theta"])
         again = replace(effect, **something).corrected(leg, shown)
         np.testing.assert_allclose(again.q[20:-20], motion.q[20:-20], atol=2e-4)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_encoder_errs_before_the_link_bends_behind_it(leg, way):
+    """In whatever order a model lists them: else the error would count as a deflection, and bend the link."""
+    motion, stiffness = smooth_motion(leg), 150.0
+    load = 20.0 * np.sin(motion.time)[:, None] * np.ones(leg.n)
+    theta = motion.q + load / stiffness + 0.004 * load
+    signals = {"q": motion.q, "theta": theta, "tau_motor": load, "tau_spring": load}
+    link = make_effect("link_flexibility", "knee", compliance=0.004, stiffness=stiffness)
+    encoder = make_effect("encoder_offset", "knee", offset=0.02)
+    pair = [link, encoder][::way]
+    seen = measured_signals(leg, pair, motion.time, signals)
+    np.testing.assert_allclose(seen["q"][:, 1], motion.q[:, 1] + 0.004 * load[:, 1] + 0.02, atol=1e-12)
+    again = corrected_motion(leg, pair, replace(motion, q=seen["q"], theta=theta))
+    np.testing.assert_allclose(again.q[:, 1], motion.q[:, 1], atol=1e-12)
 
 
 def test_a_spring_effect_cancels_in_the_sum(leg):

@@ -1,0 +1,80 @@
+"""Effects that were found without what makes them what they are: then they stand in for something else.
+
+Where the true effect is not in the library, the nearest that is there bends to it, and often fits well. It then has
+parameters that its own cause could not have:
+
+- A ripple of which the motion sees but a part ends as a wave much longer than a turn of the joint, though nothing in a
+  joint turns so slowly. Where a motion does not show the length of a wave such a length says nothing, and the wave
+  fits; where something is left beside it, the length is what came nearest to something else.
+- Friction of a link that is viscous alone, without any dry friction of the bearings and seals that it is in, is what an
+  encoder does that is late. A damper fits; where something is left, it is none.
+- A parallel spring without stiffness is a constant torque.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import slowest
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.relatives import Unnamed
+from sea_ident.discrepancy.search import Selection
+from sea_ident.effects.link_friction import LinkFriction
+from sea_ident.effects.parallel_spring import ParallelSpring
+
+NO_DRY_FRICTION = 0.01
+"""Share of the power of a friction up to which it has no dry part [-]: a tenth of its torque."""
+
+NOTHING = 3.0
+"""Standard deviations within which a parameter is nothing."""
+
+
+@dataclass(frozen=True)
+class StandIn(Unnamed):
+    """An effect that was found, and that is not what its name says."""
+
+    @property
+    def sentence(self) -> str:
+        """What it is not."""
+        return f"The {self.effect} at {self.joint} came out {self.relative}, so it stands in for something else."
+
+
+def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
+    """Effects that were found without what makes them what they are.
+
+    Args:
+        bench: the recording.
+        selection: what was found.
+
+    Returns:
+        One entry for every such effect.
+    """
+    fit, found = selection.final.fit, []
+    fits = not selection.added or lack_of_fit(bench, selection.final)[2] >= LACK_LEVEL
+    for position in range(len(fit.effects) - selection.added, len(fit.effects)):
+        effect, words = fit.effects[position], ""
+        if isinstance(effect, ParallelSpring) and _is_nothing(bench, fit, position):
+            words = "without any stiffness"
+        elif slowest(effect) and not fits:
+            words = "as less than a wave in a turn of the joint, and nothing in it turns so slowly"
+        elif isinstance(effect, LinkFriction) and not fits and _is_viscous(bench, fit, position):
+            words = "as viscous alone, as if its encoder were late, and leaves more than noise"
+        if words:
+            found.append(StandIn(effect.name, effect.joint, words, 1.0, fit))
+    return tuple(found)
+
+
+def _is_nothing(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether the first parameter of an effect is zero within its standard deviation."""
+    index = sum(bench.counts(fit.effects)[:position])
+    return bool(abs(fit.values[index]) < NOTHING * fit.std(index))
+
+
+def _is_viscous(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether nearly all power of a friction is in its viscous part, the first of its columns."""
+    start, effect = sum(bench.counts(fit.effects)[:position]), fit.effects[position]
+    spectra = bench.column_spectra(effect, fit.effects)
+    power = np.sum(np.abs(spectra * fit.values[start : start + spectra.shape[2]]) ** 2, axis=(0, 1))
+    return bool(np.sum(power[1:]) < NO_DRY_FRICTION * np.sum(power))

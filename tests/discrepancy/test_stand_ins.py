@@ -1,0 +1,84 @@
+"""Effects that were found without what makes them what they are.
+
+Torque is added to that of a leg that has nothing but what the model has, on its motion as it was measured.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.judge import slowest
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.stand_ins import stand_ins
+from sea_ident.effects import Effect, make_effect
+
+KNEE = 1
+
+
+def ripple_found(start_bench: Bench, torque: np.ndarray, order: float) -> tuple[Bench, Selection]:
+    """What a search would give that found a ripple at the knee where a torque (N,) of its motor is not in the model."""
+    total = start_bench.data.tau_motor.copy()
+    total[:, KNEE] += torque
+    bench = Bench(replace(start_bench.data, tau_motor=total), start_bench.effects)
+    return bench, found(bench, make_effect("torque_ripple", "knee", order=order))
+
+
+def found(bench: Bench, effect: Effect) -> Selection:
+    """What a search would give that found this."""
+    start = settle(bench, bench.effects)
+    begun = bench.anchored((*start.fit.effects, effect), start.fit.parameters)
+    fit = bench.refine(begun, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    return Selection(start, settle_again(bench, fit), 1, (0.0,))
+
+
+@pytest.fixture(scope="module")
+def angle(nothing_missing):
+    """(N,) angle of the motor from the middle of its path, and how far that is to either side [rad]."""
+    theta = nothing_missing[0].data.motion.theta[:, KNEE]
+    away = theta - 0.5 * (theta.max() + theta.min())
+    return away, float(away.max())
+
+
+def test_what_changes_along_the_path_is_no_ripple(nothing_missing, angle):
+    away, reach = angle
+    spring = 2.0 * (away / reach) + 1.0 * (away / reach) ** 2 + 0.15 * np.sin(9.0 * away)
+    bench, selection = ripple_found(nothing_missing[0], spring, 0.6)
+    assert slowest(selection.effects[0])
+    (wave,) = stand_ins(bench, selection)
+    assert (wave.effect, wave.joint) == ("torque_ripple", "knee")
+    assert "nothing in it turns so slowly" in wave.sentence
+
+
+def test_a_wave_of_which_the_motion_shows_but_a_part_keeps_its_name(nothing_missing, angle):
+    """It ended as the longest too, but with nothing left beside it."""
+    bench, selection = ripple_found(nothing_missing[0], np.sin(angle[0] + 0.4), 0.5)
+    assert slowest(selection.effects[0])
+    assert stand_ins(bench, selection) == ()
+
+
+def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_missing, angle):
+    away, reach = angle
+    bench, selection = ripple_found(nothing_missing[0], np.sin(12.0 * away) + (away / reach) ** 2, 12.0)
+    assert selection.final.fit.statistic > 2.0 * selection.final.fit.dof
+    assert stand_ins(bench, selection) == ()
+
+
+@pytest.mark.parametrize(("planted", "said"), [("position_delay", 1), ("link_friction", 0)])
+def test_a_late_encoder_is_no_friction_of_the_link(laboratory, planted, said):
+    """It looks viscous, but for the inertia that comes late too."""
+    how = {"position_delay": ((), {"delay": 0.004}), "link_friction": ((0.25, 0.15), {})}[planted]
+    bench = laboratory.bench(laboratory.record([(planted, "ankle", *how)]))
+    there = stand_ins(bench, found(bench, make_effect("link_friction", "ankle")))
+    assert len(there) == said
+    assert all("viscous alone" in one.sentence for one in there)
+
+
+@pytest.mark.parametrize(("stiffness", "said"), [(0.0, 1), (4.0, 0)])
+def test_a_parallel_spring_without_stiffness_is_none(laboratory, stiffness, said):
+    bench = laboratory.bench(laboratory.record([("parallel_spring", "knee", (stiffness, 0.5), {})]))
+    there = stand_ins(bench, found(bench, make_effect("parallel_spring", "knee")))
+    assert len(there) == said
+    assert all("without any stiffness" in one.sentence for one in there)
