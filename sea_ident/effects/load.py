@@ -116,7 +116,7 @@ class LoadEffect(Effect):
         return torque
 
     def rotor_torque(self, state: State) -> FloatArray:
-        """(N,) torque that the rotor of the joint takes for itself [N m], by its own inertia, which several may share."""
+        """(N,) torque that the rotor of the joint takes for itself by its inertia [N m]."""
         robot = state.robot
         rows = state.rotor_rows.motor[:, robot.index(self.at)]
         torque = np.zeros(len(rows))

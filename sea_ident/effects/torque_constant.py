@@ -45,7 +45,9 @@ class TorqueConstant(MotorLoadEffect):
         """
         factor = 1.0 + float(values[0])
         if not factor > 0.0:
-            raise EffectError(f"torque_constant of {values[0]:g} at {self.at!r} turns the motor round; give more than -1")
+            raise EffectError(
+                f"torque_constant of {values[0]:g} at {self.at!r} turns the motor round; give more than -1"
+            )
         own = [rotor.joint == self.at for rotor in robot.rotors]
         if not any(own):
             return robot
