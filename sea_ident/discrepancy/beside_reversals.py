@@ -9,10 +9,14 @@ from sea_ident.discrepancy.candidates import candidate_effects, scan
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import torque_changes
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
 from sea_ident.discrepancy.search import BESIDE_ANOTHER, MOST_EFFECTS, SMALLEST_SHARE, next_effect
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.effects.coulomb_friction import CoulombFriction
+
+SPEEDS = 12
+"""Speeds from which the start of a sliding friction is refined: each twice the one before."""
 
 USUAL = 1
 """Caution of the recordings that are looked at: one that is diagnosed without its slow samples is not."""
@@ -38,10 +42,18 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     before = confirmed.selection
     now = settle_again(near, before.final.fit)
     added: list[float] = []
+    begun: set[str | None] = set()
     while before.added + len(added) < MOST_EFFECTS:
         step = _next(near, now, before.start.fit)
         if step is None:
             break
+        joint = step[0].effects[-1].joint
+        if joint not in begun:
+            begun.add(joint)
+            again = with_sliding_start(near, now, joint)
+            if again.fit.statistic < now.fit.statistic - EQUALLY_GOOD:
+                now = again
+                continue
         added.append(step[1])
         now = settle_again(near, settle_again(near, step[0]).fit)
     if not added:
@@ -53,6 +65,33 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
         candidates=candidates, tests=max(sum(c.tests for c in candidates), 1),
     )  # fmt: skip
     return near, Confirmed(selection, near, start, now, beside=(near, now))
+
+
+def with_sliding_start(near: Bench, now: Settled, joint: str | None) -> Settled:
+    """A model with the speed up to which a friction only starts to slide where it fits best.
+
+    Where a search compares nothing that slow, that speed may have ended anywhere. From far below it no step leads
+    back: no sample is slower.
+
+    Args:
+        near: the recording with what is slow beside reversals compared.
+        now: the model there.
+        joint: of the friction.
+
+    Returns:
+        The model refined from the best speed of its range, or as it is where none is better.
+    """
+    best, own = now.fit, now.fit.effects
+    for k, effect in enumerate(own):
+        if not isinstance(effect, CoulombFriction) or effect.joint != joint:
+            continue
+        (shape,) = effect.shapes
+        for speed in shape.grid(SPEEDS):
+            other = (*own[:k], replace(effect, smoothing=float(speed)), *own[k + 1 :])
+            best = min(
+                best, near.fit(other, now.noise, start=now.fit.parameters, tangents=False), key=lambda f: f.statistic
+            )
+    return now if best is now.fit else settle_again(near, best)
 
 
 def _next(near: Bench, now: Settled, start: Fit) -> tuple[Fit, float] | None:

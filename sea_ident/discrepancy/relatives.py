@@ -3,8 +3,9 @@
 A search takes the nearest that there is. A ripple that grows with the load is found as a ripple, at the right joint and
 of the right order, and most of the gap goes with it; friction whose viscous part changes over the turn is found as
 friction whose dry part does. So every effect that was found is held against its own columns times a signal that they
-do not depend on, and against the same effect driven by another joint. Where one of these *in its place* leaves hardly
-anything of what the named effect leaves, the named one is not what is there.
+do not depend on, and against the same effect driven by another joint. Where one of these *in its place* fits better by
+long odds and leaves no more than noise, or hardly anything of what the named effect leaves, the named one is not what
+is there. Whether what the named one leaves stands out of noise does not matter.
 
 What depends on a signal already is not multiplied by it: friction that grows with another power of the speed is still
 friction that grows with the speed.
@@ -43,7 +44,8 @@ from sea_ident.effects.torque_constant import TorqueConstant
 from sea_ident.robot import Robot
 
 LEAVES = 0.3
-"""Share of the excess that a relative may leave of what the named effect leaves to be taken for the truth [-]."""
+"""Share of the excess that a relative may leave of what the named effect leaves to be taken for the truth, unless it
+leaves no more than noise [-]."""
 
 PROMISED = 0.5
 """Share of what the named effect explains that a relative must promise to explain before it is fitted [-]."""
@@ -124,10 +126,10 @@ class Unnamed:
                 f"{self.effect} and {self.second} at {self.joint} are what one effect alone does as well: "
                 f"{self.relative}, with a parameter less."
             )
-        share = f"{100 * self.share:.2g} %"
-        return (
-            f"The same as {self.effect} at {self.joint}, but {self.relative}, leaves {share} of what that one leaves."
-        )
+        same = f"The same as {self.effect} at {self.joint}, but {self.relative},"
+        if self.share > LEAVES:
+            return f"{same} leaves no more than noise, and fits better by odds of more than a thousand to one."
+        return f"{same} leaves {100 * self.share:.2g} % of what that one leaves."
 
 
 @dataclass(frozen=True)
@@ -247,8 +249,6 @@ def unnamed(
     """
     now = selection.final
     pairs = _one_for_two(*(away or (bench, now)), selection, held)
-    if not selection.added or lack_of_fit(bench, now)[2] >= LACK_LEVEL:
-        return pairs
     first, found = len(now.fit.effects) - selection.added, []
     for k in range(selection.added):
         best = _best(bench, now, first + k)
@@ -337,13 +337,19 @@ def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
     reduced = bench.fit(others, noise, start=fit.parameters)
     gain = reduced.statistic - fit.statistic
     best: Unnamed | None = None
+    better = EQUALLY_GOOD + 2.0 * float(np.log(len(family)))
     for candidate in scan(bench, reduced, noise, family)[:TRIED]:
         if candidate.gain < PROMISED * gain:
             continue
         new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
+        if new.excess > LEAVES * fit.excess:
+            # the shapes of the model are those beside the named effect
+            new = bench.refine(new.effects, noise, start=new.parameters)
         unit = max(new.statistic / max(new.dof, 1), 1.0)
         share = new.excess / max(fit.excess, 1.0)
-        if share > LEAVES or fit.statistic - new.statistic < EQUALLY_GOOD * unit:
+        if fit.statistic - new.statistic < better * unit:
+            continue
+        if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
             continue
         if best is None or share < best.share:
             best = Unnamed(own.name, own.joint, _in_words(candidate), share, new)

@@ -115,6 +115,18 @@ class LoadEffect(Effect):
         torque: FloatArray = self.load(state) + (inertia or 0.0) * motion.ddtheta[:, i] + friction
         return torque
 
+    def rotor_torque(self, state: State) -> FloatArray:
+        """(N,) torque that the rotor of the joint takes for itself by its inertia [N m]."""
+        robot = state.robot
+        rows = state.rotor_rows.motor[:, robot.index(self.at)]
+        torque = np.zeros(len(rows))
+        for k, rotor in enumerate(robot.rotors):
+            if rotor.joint == self.at:
+                known = self.reflected_inertia
+                inertia = (rotor.rotor_inertia or 0.0) if known is None else known / rotor.gear_ratio**2
+                torque += inertia * rows[:, k]
+        return torque
+
     def sign(self, velocity: FloatArray) -> FloatArray:
         """Smoothed sign of a velocity."""
         return smooth_sign(velocity, self.smoothing)

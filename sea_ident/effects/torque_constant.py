@@ -3,18 +3,21 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Side
+from sea_ident.effects.base import Column, Contribution, Side, State
 from sea_ident.effects.load import MotorLoadEffect
+from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
 class TorqueConstant(MotorLoadEffect):
-    """E tau in the motor row alone, tau being the torque that the joint carries.
+    """E (tau + tau_r) in the motor row alone: the torque that the joint carries, and what the rotor takes itself.
 
-    The motor's own inertia and friction take up their part of the change. A change common to all motors cannot be
-    seen: only ratios can.
+    The motor's own friction takes up its part of the change, the inertia of a rotor that is one of several alike does
+    not. A change common to all motors cannot be seen: only ratios can.
     """
 
     name: ClassVar[str] = "torque_constant"
@@ -29,3 +32,24 @@ class TorqueConstant(MotorLoadEffect):
     def column_of(self, load: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Tau."""
         return load[:, None]
+
+    def evaluate(self, state: State) -> Contribution:
+        """Motor row (N, n, 1)."""
+        return state.at(Side.MOTOR, self.at, self.column_of(self.load(state) + self.rotor_torque(state), np.zeros(0)))
+
+    def modified(self, robot: Robot, values: FloatArray) -> Robot:
+        """The robot whose rotor takes as much more of the torque as is recorded; the load follows in `torque`.
+
+        Raises:
+            EffectError: if the motor would turn the other way.
+        """
+        factor = 1.0 + float(values[0])
+        if not factor > 0.0:
+            raise EffectError(
+                f"torque_constant of {values[0]:g} at {self.at!r} turns the motor round; give more than -1"
+            )
+        own = [rotor.joint == self.at for rotor in robot.rotors]
+        if not any(own):
+            return robot
+        inertias = np.where(own, factor, 1.0) * robot.rotor_inertias()
+        return robot.with_inertial_parameters(robot.inertial_parameters, inertias)

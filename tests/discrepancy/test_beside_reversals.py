@@ -14,6 +14,8 @@ from sea_ident.discrepancy.heldout import held_out
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import BESIDE_REVERSALS
+from sea_ident.effects import make_effect
+from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
 SIZE, SPEED, EXPONENT = 1.2, 0.03, 1.0
 """Friction of the knee that is gone where what a search compares begins."""
@@ -83,6 +85,20 @@ def test_another_motion_is_compared_beside_its_reversals_too(sticking, laborator
     held, _ = held_out(near, confirmed.selection, laboratory.record(periods=2, motion=1))
     assert held.other_motion
     assert held.bench.data.caution == BESIDE_REVERSALS
+
+
+def test_a_start_of_sliding_that_a_search_did_not_see_is_no_friction_more(laboratory):
+    """Its speed was left so low that no sample is slower: no step leads back."""
+    speed = 0.01
+    recording = laboratory.record(periods=12, jitter=FrictionJitter(0.02, 0.05), friction=SmoothCoulomb(speed))
+    low = make_effect("coulomb_friction", "ankle", smoothing=1e-4)
+    bench = laboratory.bench(
+        recording, [low if e.name == low.name and e.joint == low.joint else e for e in laboratory.effects]
+    )
+    _, confirmed = searched_beside_reversals(bench, unsearched(bench))
+    assert named(confirmed.selection) == []
+    (own,) = (e for e in confirmed.beside[1].fit.effects if e.name == low.name and e.joint == low.joint)
+    assert own.smoothing == pytest.approx(speed, rel=0.2)
 
 
 def test_fewer_than_ten_periods_are_not_looked_at(nothing_missing):

@@ -13,6 +13,8 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import conclude
 from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.relatives import Growth, relatives_of, unnamed
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
@@ -58,6 +60,27 @@ def test_a_ripple_that_grows_with_the_load_is_not_a_ripple(ripple_found):
     assert relative.order == pytest.approx(12.0, abs=0.5)
     amplitude = np.hypot(*(one.fit.parameters[c.name] for c in relative.columns(bench.robot)))
     assert amplitude * bench.robot.spring("hip").stiffness == pytest.approx(23.0, rel=0.1)
+
+
+def with_ripple(bench: Bench, growth: float, constant: float) -> Bench:
+    """A ripple of the hip, part of which grows with the deflection."""
+    motion = bench.data.motion
+    return with_torque(
+        bench, (HIP, (growth * motion.deflection[:, HIP] + constant) * np.sin(12.0 * motion.theta[:, HIP]))
+    )
+
+
+@pytest.mark.parametrize(("growth", "constant", "nameless"), [(11.0, 0.0, True), (0.0, 0.5, False)])
+def test_what_one_leaves_need_not_stand_out_of_noise(nothing_missing, growth, constant, nameless):
+    bench = with_ripple(nothing_missing[0], growth, constant)
+    selection = found(bench, make_effect("torque_ripple", "hip", order=12.5))
+    assert lack_of_fit(bench, selection.final)[2] > LACK_LEVEL
+    relatives = unnamed(bench, selection, None)
+    assert [one.relative.split()[0] for one in relatives] == ["growing"] * nameless
+    for one in relatives:
+        assert "with the" in one.relative
+        assert "load" in one.relative
+        assert selection.final.fit.statistic - one.fit.statistic > EQUALLY_GOOD
 
 
 def test_it_is_said_in_the_verdict_and_in_words(ripple_found):

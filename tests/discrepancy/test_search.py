@@ -8,6 +8,7 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
+from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.search import BESIDE_ANOTHER, _acceptable, search, visible_changes
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
@@ -48,6 +49,20 @@ def test_the_small_one_would_not_count_at_the_joint_of_the_large_one(unequal):
         )
     assert np.max(changes["hip"]) < BESIDE_ANOTHER * np.max(changes["knee"])
     assert np.any(changes["hip"] > BESIDE_ANOTHER * changes["knee"])
+
+
+def test_a_torque_constant_is_all_that_a_motor_with_another_one_lacks(nothing_missing):
+    """Of three motors that share one rotor inertia the torque of one is recorded two fifths too large."""
+    data = nothing_missing[0].data
+    factor = np.where(np.arange(data.robot.n) == data.robot.index("knee"), 1.4, 1.0)
+    assert len(data.robot.rotor_groups) == 1
+    other = replace(data, tau_motor=factor * data.tau_motor, period_tau_motor=factor * data.period_tau_motor)
+    bench = Bench(other, nothing_missing[0].effects)
+    found = search(bench, bench.effects)
+    assert named(found) == {("torque_constant", "knee")}
+    fit = found.final.fit
+    assert fit.parameters["knee.torque_constant"] == pytest.approx(0.4, abs=4.0 * fit.std(len(fit.columns) - 1))
+    assert lack_of_fit(bench, found.final)[2] > 0.01
 
 
 def test_the_longest_wave_costs_more_than_a_constant(nothing_missing):

@@ -82,6 +82,10 @@ def compare(bench, added, tolerance=2e-4):
             changed[position] = moved(effects[position], shape, step)
             ends.append(scaled_residual(bench, changed, parameters))
         decrease = (ends[1] - ends[0]) / (2.0 * STEP)
+        if shape.name == "point_y":
+            # along the axis of the joints it changes no moment about them
+            assert np.linalg.norm(decrease) == np.linalg.norm(tangents[:, :, k]) == 0.0
+            continue
         error = np.linalg.norm(decrease - tangents[:, :, k]) / np.linalg.norm(decrease)
         assert np.linalg.norm(decrease) > 0.0
         assert error < tolerance, (effects[position].name, shape.name, error)
@@ -93,7 +97,7 @@ def test_every_shape_of_every_effect(nothing_missing, name):
     effect = next(e for e in kind.instances(nothing_missing[0].robot) if e.joint == "knee")
     if isinstance(effect, SignalEffect):
         effect = replace(effect, **{amount.name: 0.03 * amount.upper for amount in effect.amounts})
-    for shape in effect.shapes:
+    for _, shape in free_shapes((effect,)):
         if not shape.logarithmic:  # away from the ends of its range
             effect = replace(effect, **{shape.name: 0.7 * shape.upper + 0.3 * shape.lower})
     # where an element of a hysteresis slips or sticks its torque has a kink: two steps of different size see two slopes
