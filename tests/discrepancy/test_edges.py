@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy import edges
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
-from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.simulation import PlantedEffect, simulate
@@ -40,35 +38,6 @@ def test_the_edges_are_found_to_the_sample_from_any_window(pushed, window):
     # the force along the axis of rotation moves no joint
     assert found.parameters["knee.external_force_x"] == pytest.approx(4.0, abs=0.2)
     assert found.parameters["knee.external_force_z"] == pytest.approx(2.0, abs=0.2)
-
-
-def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
-    """What pushes back all the time but then differs by a constant force, of which a model takes up the most."""
-    bench, now = pushed
-    sample = PERIOD / bench.data.samples
-    monkeypatch.setattr(edges, "_best_window", lambda *_: (STOP + sample, START - sample))
-    effect = make_effect("external_force", "knee", start=STOP + sample, stop=START - sample, period=PERIOD)
-    begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
-    found = with_sharp_edges(bench, begun, now.noise, len(now.fit.effects))
-    assert found.effects[-1].start == pytest.approx(START, abs=1.01 * sample)
-    assert found.effects[-1].stop == pytest.approx(STOP, abs=1.01 * sample)
-
-
-def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
-    """Of what turns the link only the moment about the axis of the joints shows."""
-    force, point = np.array([4.0, 0.0, 2.0]), {"point_x": 0.05, "point_z": -0.08}
-    push = make_effect("external_force", "ankle", start=START, stop=STOP, period=PERIOD, **point)
-    bench = laboratory.bench(laboratory.record([(push, force)]))
-    found = search(bench, bench.effects)
-    assert [(e.name, e.joint) for e in found.effects] == [("external_force", "ankle")]
-    own, fit, noise = found.effects[0], found.final.fit, found.final.noise
-    # it explains as much as the truth does: that it begins between two samples is in neither
-    model = [push if effect is own else effect for effect in fit.effects]
-    assert fit.statistic < bench.fit(model, noise, start=fit.parameters).statistic
-    x, z = (fit.parameters[f"ankle.external_force_{axis}"] for axis in "xz")
-    assert (x, z) == pytest.approx((4.0, 2.0), abs=0.3)
-    turned = own.point_z * x - own.point_x * z  # the foot is nearly level throughout
-    assert turned == pytest.approx(point["point_z"] * 4.0 - point["point_x"] * 2.0, abs=0.05)
 
 
 def test_the_best_window_is_the_one_that_fits_best(pushed):
