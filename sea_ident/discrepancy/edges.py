@@ -38,11 +38,22 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -
     if not isinstance(push, ExternalForce):
         return fit
     period, samples = bench.data.period, bench.data.samples
-    interval = period / samples
     stride = max(samples // INSTANTS, 1)
     wide = _with(fit, position, *_best_window(bench, fit, noise, position, stride), bench, noise)
-    fit = min(fit, wide, key=lambda each: each.statistic)
-    step = stride
+    fit = _sharpened(bench, min(fit, wide, key=lambda each: each.statistic), noise, position, stride)
+    # what pushes all the time but then is nearly the same as what pushes then, for a model takes up a constant force
+    found, interval = fit.effects[position], period / samples
+    start, stop = (getattr(found, name) for name in ("start", "stop"))
+    begin, end = (float(np.mod(edge, period)) for edge in (stop + interval, start - interval))
+    fit = min(fit, _with(fit, position, begin, end, bench, noise), key=lambda each: each.statistic)
+    fit = _sharpened(bench, fit, noise, position, 1)
+    return bench.fit(fit.effects, noise, start=fit.parameters)
+
+
+def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: int) -> Fit:
+    """A fit with the edges of a push moved by smaller and smaller steps, from so many samples to one."""
+    period = bench.data.period
+    interval = period / bench.data.samples
     while step:
         better = fit
         for moves in ((1, 0), (0, 1), (1, 1)):
@@ -58,7 +69,7 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -
         if better is fit:
             step //= 2
         fit = better
-    return bench.fit(fit.effects, noise, start=fit.parameters)
+    return fit
 
 
 def _with(fit: Fit, position: int, start: float, stop: float, bench: Bench, noise: NoiseFloor) -> Fit:

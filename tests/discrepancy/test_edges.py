@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy import edges
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
@@ -38,6 +39,18 @@ def test_the_edges_are_found_to_the_sample_from_any_window(pushed, window):
     # the force along the axis of rotation moves no joint
     assert found.parameters["knee.external_force_x"] == pytest.approx(4.0, abs=0.2)
     assert found.parameters["knee.external_force_z"] == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
+    """What pushes back all the time but then differs by a constant force, of which a model takes up the most."""
+    bench, now = pushed
+    sample = PERIOD / bench.data.samples
+    monkeypatch.setattr(edges, "_best_window", lambda *_: (STOP + sample, START - sample))
+    effect = make_effect("external_force", "knee", start=STOP + sample, stop=START - sample, period=PERIOD)
+    begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
+    found = with_sharp_edges(bench, begun, now.noise, len(now.fit.effects))
+    assert found.effects[-1].start == pytest.approx(START, abs=1.01 * sample)
+    assert found.effects[-1].stop == pytest.approx(STOP, abs=1.01 * sample)
 
 
 def test_the_best_window_is_the_one_that_fits_best(pushed):
