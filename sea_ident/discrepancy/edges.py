@@ -1,4 +1,4 @@
-"""When a push begins and ends: every window of a period is compared, then its edges are moved to the sample."""
+"""When a push begins and ends: every window of a period is compared, then its edges are moved to a part of a sample."""
 
 from dataclasses import replace
 
@@ -13,6 +13,12 @@ from sea_ident.effects.external_force import ExternalForce
 
 INSTANTS = 160
 """Instants in a period between which every push is compared."""
+
+FINEST_STEP = 1.0 / 16.0
+"""Last step by which edges are moved, in samples."""
+
+NEARLY = 1e-12
+"""Share of a period by which a push is shorter than all of it."""
 
 ABSORBED = 1e-6
 """A component of a push of which the model leaves less than this share of its power is not looked at."""
@@ -37,24 +43,30 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -
     push = fit.effects[position]
     if not isinstance(push, ExternalForce):
         return fit
-    period, samples = bench.data.period, bench.data.samples
-    stride = max(samples // INSTANTS, 1)
+    stride = max(bench.data.samples // INSTANTS, 1)
     wide = _with(fit, position, *_best_window(bench, fit, noise, position, stride), bench, noise)
     fit = _sharpened(bench, min(fit, wide, key=lambda each: each.statistic), noise, position, stride)
     # what pushes all the time but then is nearly the same as what pushes then, for a model takes up a constant force
-    found, interval = fit.effects[position], period / samples
-    start, stop = (getattr(found, name) for name in ("start", "stop"))
-    begin, end = (float(np.mod(edge, period)) for edge in (stop + interval, start - interval))
-    fit = min(fit, _with(fit, position, begin, end, bench, noise), key=lambda each: each.statistic)
+    start, stop = (getattr(fit.effects[position], name) for name in ("start", "stop"))
+    fit = min(fit, _with(fit, position, stop, start, bench, noise), key=lambda each: each.statistic)
     fit = _sharpened(bench, fit, noise, position, 1)
     return bench.fit(fit.effects, noise, start=fit.parameters)
 
 
-def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: int) -> Fit:
-    """A fit with the edges of a push moved by smaller and smaller steps, from so many samples to one."""
+def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
+    """A fit with the edges of all pushes from a position on moved a little: what was found since bent them before."""
+    for position in range(first, len(fit.effects)):
+        if isinstance(fit.effects[position], ExternalForce):
+            moved = _sharpened(bench, fit, noise, position, 1)
+            fit = bench.fit(moved.effects, noise, start=moved.parameters)
+    return fit
+
+
+def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: float) -> Fit:
+    """A fit with the edges of a push moved by smaller and smaller steps, from so many samples to a part of one."""
     period = bench.data.period
     interval = period / bench.data.samples
-    while step:
+    while step >= FINEST_STEP:
         better = fit
         for moves in ((1, 0), (0, 1), (1, 1)):
             for sign in (-1, 1):
@@ -67,7 +79,7 @@ def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: i
                 if new.statistic < better.statistic:
                     better = new
         if better is fit:
-            step //= 2
+            step = float(step // 2) if step > 1.0 else step / 2.0
         fit = better
     return fit
 
@@ -89,7 +101,9 @@ def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, strid
     rest = bench.fit(others, noise, start=fit.parameters)
     left = rest.off(rest.whitened)
     ends = np.arange(stride, samples + 1, stride)
-    begun = [replace(push, start=0.0, stop=float(end - 1) * interval, period=period) for end in ends]  # type: ignore[call-arg]
+    # each sample stands for half an interval to either side; a push of a whole period would be none
+    stops = [(float(end) - 0.5) * interval - NEARLY * period for end in ends]
+    begun = [replace(push, start=-0.5 * interval, stop=stop, period=period) for stop in stops]  # type: ignore[call-arg]
     touched, spectra = bench.variant_spectra(begun, others)
     harmonics, equations, count, width = spectra.shape
     whole = np.zeros((harmonics, len(rest.scale), count * width), dtype=np.complex128)
@@ -100,7 +114,8 @@ def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, strid
     columns = np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
     gains = _window_gains(columns, left)
     i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
-    return float(i * stride % samples) * interval, float((int(j) * stride - 1) % samples) * interval
+    first, last = ((float(int(k) * stride) - 0.5) * interval for k in (i, j))
+    return float(np.mod(first, period)), float(np.mod(last, period))
 
 
 def _window_gains(columns: FloatArray, left: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.edges import sharpened
 from sea_ident.discrepancy.exchange import Outdone, Tried, exchange
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
@@ -151,6 +152,8 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
             if now.fit.statistic / now.fit.dof > 0.98 * before:
                 break
         now = exchange(bench, now, len(added), tried)
+        sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
+        now = now if sharp is now.fit else settle_again(bench, sharp)
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
         if lost and now.fit.excess > SLOW * last.fit.excess:
             break

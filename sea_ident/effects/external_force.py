@@ -52,9 +52,25 @@ class ExternalForce(Effect):
         return tuple(Column(self.parameter_name(axis), "N", self.name, self.joint, self.side) for axis in "xyz")
 
     def evaluate(self, state: State) -> Contribution:
-        """-J' while it pushes."""
-        link = -_jacobians(state, self._body(state.robot), self.pushes(state.motion.time))
+        """-J' while it pushes, less in the samples in which it begins and ends: as much as it pushes about them."""
+        share = self.share_of(state.motion.time)
+        link = -_jacobians(state, self._body(state.robot), share > 0.0) * share[:, None, None]
         return Contribution(link, np.broadcast_to(0.0, link.shape))
+
+    def share_of(self, time: FloatArray) -> FloatArray:
+        """(N,) share of the time around each of evenly spaced samples (N,) [s] in which it pushes [-]."""
+        if len(time) < 2:
+            return self.pushes(time).astype(np.float64)
+        half = 0.5 * float(time[-1] - time[0]) / (len(time) - 1)
+        return np.asarray((self._pushed(time + half) - self._pushed(time - half)) / (2.0 * half), dtype=np.float64)
+
+    def _pushed(self, time: FloatArray) -> FloatArray:
+        """(N,) how long it has pushed until some times (N,) [s]."""
+        if not self.period > 0.0:
+            return np.clip(time, self.start, self.stop)
+        length = float(np.mod(self.stop - self.start, self.period))
+        rounds, phase = np.divmod(time - self.start, self.period)
+        return np.asarray(rounds * length + np.minimum(phase, length), dtype=np.float64)
 
     def pushes(self, time: FloatArray) -> NDArray[np.bool_]:
         """Whether it pushes at the times (any shape) [s]."""
