@@ -1,4 +1,7 @@
-"""When a push begins and ends: every window of a period is compared, then its edges are moved to a part of a sample."""
+"""When a push begins and ends: every window of a period is compared, then its edges are moved to a part of a sample.
+
+Where it meets the link is asked last: a point would bend to a window that is not yet right.
+"""
 
 from dataclasses import replace
 
@@ -16,6 +19,12 @@ INSTANTS = 160
 
 FINEST_STEP = 1.0 / 16.0
 """Last step by which edges are moved, in samples."""
+
+POINT_ROUNDS = 4
+"""Rounds in which the point of a push and its edges follow each other, ..."""
+
+ENOUGH = 0.05
+"""... or fewer, once the point takes less than this share of the excess."""
 
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
@@ -50,16 +59,26 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -
     start, stop = (getattr(fit.effects[position], name) for name in ("start", "stop"))
     fit = min(fit, _with(fit, position, stop, start, bench, noise), key=lambda each: each.statistic)
     fit = _sharpened(bench, fit, noise, position, 1)
-    return bench.fit(fit.effects, noise, start=fit.parameters)
+    return _with_point(bench, fit, noise, position)
 
 
 def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
     """A fit with the edges of all pushes from a position on moved a little: what was found since bent them before."""
     for position in range(first, len(fit.effects)):
         if isinstance(fit.effects[position], ExternalForce):
-            moved = _sharpened(bench, fit, noise, position, 1)
-            fit = bench.fit(moved.effects, noise, start=moved.parameters)
+            fit = _with_point(bench, _sharpened(bench, fit, noise, position, 1), noise, position)
     return fit
+
+
+def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A fit with the point of a push refined, and its edges once more, for these are held where it was wrong."""
+    for _ in range(POINT_ROUNDS):
+        before = fit.statistic
+        fit = bench.refine(fit.effects, noise, start=fit.parameters, only=position)
+        if before - fit.statistic < ENOUGH * fit.excess:
+            return fit
+        fit = _sharpened(bench, fit, noise, position, 1)
+    return bench.fit(fit.effects, noise, start=fit.parameters)
 
 
 def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: float) -> Fit:

@@ -13,6 +13,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Shape
+from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
 
@@ -61,7 +62,10 @@ def refitted(
         model = (*before, each, *after)
         if fits and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
             continue
-        fits.append(bench.refine(model, noise, start=start, only=len(bench.effects), beat=beat))
+        if isinstance(each, ExternalForce):
+            fits.append(bench.fit(model, noise, start=start))
+        else:
+            fits.append(bench.refine(model, noise, start=start, only=len(bench.effects), beat=beat))
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     if isinstance(effect, SignalEffect):
         best = from_described_springs(bench, best, len(before), noise, start)

@@ -20,21 +20,32 @@ _BEGINS = 32
 _LENGTHS = (2, 4, 6, 9)
 """Its lengths, in steps between two beginnings."""
 
+_REACH = 0.5
+"""Distance from the centre of mass up to which a link is pushed, along every axis [m]."""
+
 
 @dataclass(frozen=True)
 class ExternalForce(Effect):
-    """A constant force on the centre of mass of a link from `start` to `stop`, -J' f in the link rows.
+    """A constant force on a point of a link from `start` to `stop`, -J' f in the link rows.
+
+    Nobody says where a push meets a link; away from the centre of mass as described it turns the link too.
 
     Attributes:
         joint: joint whose link is pushed.
         start: [s].
         stop: [s]; before `start` where a periodic push goes on round the end of the period.
         period: after which the push comes again, 0 where it comes once [s].
+        point_x: where it pushes, from the described centre of mass along the x axis of the link [m].
+        point_y: along the y axis [m].
+        point_z: along the z axis [m].
     """
 
     start: float = 0.0
     stop: float = 1e6
     period: float = 0.0
+    point_x: float = 0.0
+    point_y: float = 0.0
+    point_z: float = 0.0
 
     name: ClassVar[str] = "external_force"
     side: ClassVar[Side] = Side.LINK
@@ -44,6 +55,9 @@ class ExternalForce(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", 0.0, 1e6, logarithmic=False),
         Shape("stop", "s", 0.0, 1e6, logarithmic=False),
+        Shape("point_x", "m", -_REACH, _REACH, logarithmic=False),
+        Shape("point_y", "m", -_REACH, _REACH, logarithmic=False),
+        Shape("point_z", "m", -_REACH, _REACH, logarithmic=False),
     )
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
@@ -54,7 +68,7 @@ class ExternalForce(Effect):
     def evaluate(self, state: State) -> Contribution:
         """-J' while it pushes, less in the samples in which it begins and ends: as much as it pushes about them."""
         share = self.share_of(state.motion.time)
-        link = -_jacobians(state, self._body(state.robot), share > 0.0) * share[:, None, None]
+        link = -_jacobians(state, self._body(state.robot), share > 0.0, self._point) * share[:, None, None]
         return Contribution(link, np.broadcast_to(0.0, link.shape))
 
     def share_of(self, time: FloatArray) -> FloatArray:
@@ -62,7 +76,10 @@ class ExternalForce(Effect):
         if len(time) < 2:
             return self.pushes(time).astype(np.float64)
         half = 0.5 * float(time[-1] - time[0]) / (len(time) - 1)
-        return np.asarray((self._pushed(time + half) - self._pushed(time - half)) / (2.0 * half), dtype=np.float64)
+        begin, end = time - half, time + half
+        if not self.period > 0.0:  # nothing is known of what was before and after
+            begin, end = np.maximum(begin, time[0]), np.minimum(end, time[-1])
+        return np.asarray((self._pushed(end) - self._pushed(begin)) / (end - begin), dtype=np.float64)
 
     def _pushed(self, time: FloatArray) -> FloatArray:
         """(N,) how long it has pushed until some times (N,) [s]."""
@@ -87,7 +104,7 @@ class ExternalForce(Effect):
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
             if bool(self.pushes(np.array(state.time))):
                 x = robot.extended_state(state.q, state.theta)
-                link[:] -= robot.link_map.T @ (_jacobian(robot, data, body, x) @ force)
+                link[:] -= robot.link_map.T @ (_jacobian(robot, data, body, x, self._point) @ force)
 
         return act
 
@@ -105,6 +122,10 @@ class ExternalForce(Effect):
                 found.append(replace(self, start=start, stop=stop, period=period))
         return tuple(found)
 
+    @property
+    def _point(self) -> FloatArray:
+        return np.array([self.point_x, self.point_y, self.point_z])
+
     def _body(self, robot: Robot) -> int:
         if self.joint is None:
             raise EffectError(f"the effect {self.name!r} pushes a link; give the joint that moves it, joint=...")
@@ -113,14 +134,16 @@ class ExternalForce(Effect):
         return int(robot.body_indices[names.index(self.joint)])
 
 
-def _jacobians(state: State, body: int, wanted: NDArray[np.bool_]) -> FloatArray:
-    """(N, n, 3) transposed Jacobians of the centre of mass of a body in the link rows, zero where not `wanted` (N,).
+def _jacobians(state: State, body: int, wanted: NDArray[np.bool_], point: FloatArray) -> FloatArray:
+    """(N, n, 3) transposed Jacobians of a point of a body in the link rows, zero where not `wanted` (N,).
 
-    Each is computed once per state.
+    The point is given from the centre of mass, in the axes of the body. What does not depend on it is computed once per
+    state.
     """
     robot, motion = state.robot, state.motion
-    kept: dict[int, tuple[NDArray[np.bool_], FloatArray]] = state.__dict__.setdefault("_jacobians", {})
-    known, rows = kept.setdefault(body, (np.zeros(len(motion), dtype=bool), np.zeros((len(motion), robot.n, 3))))
+    kept: dict[int, tuple[NDArray[np.bool_], FloatArray, FloatArray]] = state.__dict__.setdefault("_jacobians", {})
+    nothing = np.zeros(len(motion), dtype=bool), np.zeros((len(motion), robot.n, 6)), np.zeros((len(motion), 3, 3))
+    known, rows, turns = kept.setdefault(body, nothing)
     missing = np.flatnonzero(wanted & ~known)
     if len(missing):
         model = robot.extended_model.copy()
@@ -131,17 +154,22 @@ def _jacobians(state: State, body: int, wanted: NDArray[np.bool_]) -> FloatArray
         for k, x in enumerate(np.ascontiguousarray(robot.extended_state(motion.q[missing], motion.theta[missing]))):
             # a robot with a single velocity gets its Jacobian as a vector
             full[k] = pin.computeFrameJacobian(model, data, x, frame, axes).reshape(6, model.nv)
-        rows[missing] = robot.link_map.T @ full[:, :3].transpose(0, 2, 1)
+            turns[missing[k]] = data.oMi[body].rotation
+        rows[missing] = robot.link_map.T @ full.transpose(0, 2, 1)
         known[missing] = True
-    return np.where(wanted[:, None, None], rows, 0.0)
+    moved = rows[:, :, :3]
+    if np.any(point):
+        # a point away from the centre moves with the rotation too: v + w x arm
+        moved = moved + np.cross(rows[:, :, 3:], (turns @ point)[:, None])
+    return np.where(wanted[:, None, None], moved, 0.0)
 
 
-def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray) -> FloatArray:
-    """(nv, 3) transposed Jacobian of the centre of mass of a body, in the axes of the base."""
+def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray, point: FloatArray) -> FloatArray:
+    """(nv, 3) transposed Jacobian of a point of a body, given from its centre of mass, in the axes of the base."""
     model = robot.extended_model
     pin.computeJointJacobians(model, data, x)
     # a robot with a single velocity gets its Jacobian as a vector
     full = pin.getJointJacobian(model, data, body, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
-    arm = data.oMi[body].rotation @ model.inertias[body].lever
+    arm = data.oMi[body].rotation @ (model.inertias[body].lever + point)
     jacobian: FloatArray = full[:3] - pin.skew(arm) @ full[3:]
     return jacobian.T

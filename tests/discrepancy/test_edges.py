@@ -9,6 +9,7 @@ from sea_ident.discrepancy import edges
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
+from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.simulation import PlantedEffect, simulate
@@ -53,6 +54,23 @@ def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
     assert found.effects[-1].stop == pytest.approx(STOP, abs=1.01 * sample)
 
 
+def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
+    """Of what turns the link only the moment about the axis of the joints shows."""
+    force, point = np.array([4.0, 0.0, 2.0]), {"point_x": 0.05, "point_z": -0.08}
+    push = make_effect("external_force", "ankle", start=START, stop=STOP, period=PERIOD, **point)
+    bench = laboratory.bench(laboratory.record([(push, force)]))
+    found = search(bench, bench.effects)
+    assert [(e.name, e.joint) for e in found.effects] == [("external_force", "ankle")]
+    own, fit, noise = found.effects[0], found.final.fit, found.final.noise
+    # it explains as much as the truth does
+    model = [push if effect is own else effect for effect in fit.effects]
+    assert fit.statistic < bench.fit(model, noise, start=fit.parameters).statistic
+    x, z = (fit.parameters[f"ankle.external_force_{axis}"] for axis in "xz")
+    assert (x, z) == pytest.approx((4.0, 2.0), abs=0.3)
+    turned = own.point_z * x - own.point_x * z  # the foot is nearly level throughout
+    assert turned == pytest.approx(point["point_z"] * 4.0 - point["point_x"] * 2.0, abs=0.05)
+
+
 def test_the_best_window_is_the_one_that_fits_best(pushed):
     bench, now = pushed
     effect = make_effect("external_force", "knee", start=1.0, stop=2.0, period=PERIOD)
@@ -63,11 +81,12 @@ def test_the_best_window_is_the_one_that_fits_best(pushed):
     interval = PERIOD / bench.data.samples
 
     def statistic(start, stop):
-        own = replace(effect, start=start * interval, stop=(stop - 1) % bench.data.samples * interval)
+        # each sample stands for half an interval to either side
+        own = replace(effect, start=(start - 0.5) % bench.data.samples * interval, stop=(stop - 0.5) * interval)
         return bench.fit((*now.fit.effects, own), now.noise, start=now.fit.parameters, tangents=False).statistic
 
     places = np.arange(0, bench.data.samples, stride)
     every = {(i, j): statistic(int(i), int(j)) for i in places for j in places if i != j}
     (start, stop), least = min(every.items(), key=lambda item: item[1])
-    assert best == pytest.approx((start * interval, (stop - 1) % bench.data.samples * interval))
+    assert best == pytest.approx(((start - 0.5) * interval, (stop - 0.5) * interval))
     assert least < 0.5 * now.fit.statistic

@@ -82,6 +82,10 @@ def compare(bench, added, tolerance=2e-4):
             changed[position] = moved(effects[position], shape, step)
             ends.append(scaled_residual(bench, changed, parameters))
         decrease = (ends[1] - ends[0]) / (2.0 * STEP)
+        if shape.name == "point_y":
+            # along the axis of the joints it changes no moment about them
+            assert np.linalg.norm(decrease) == np.linalg.norm(tangents[:, :, k]) == 0.0
+            continue
         error = np.linalg.norm(decrease - tangents[:, :, k]) / np.linalg.norm(decrease)
         assert np.linalg.norm(decrease) > 0.0
         assert error < tolerance, (effects[position].name, shape.name, error)

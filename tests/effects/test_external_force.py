@@ -1,0 +1,57 @@
+"""A push does the work of a force on the point that it meets."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sea_ident
+from sea_ident.effects import SimulationState, State, make_effect
+from sea_ident.motion import Motion
+
+FORCE, STEP = np.array([3.0, -1.0, 2.0]), 1e-6
+
+
+def place(robot, joint, q, point):
+    """(3,) of a point of the link that a joint moves, given from its centre of mass."""
+    model = robot.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    index = model.getJointId(joint)
+    return data.oMi[index].act(model.inertias[index].lever + point)
+
+
+@pytest.mark.parametrize("point", [np.zeros(3), np.array([0.1, -0.2, 0.3])], ids=["centre", "elsewhere"])
+@pytest.mark.parametrize("joint", ["knee", "ankle"])
+def test_its_power_is_that_of_the_force(joint, point):
+    robot = sea_ident.load_robot("exo_leg")
+    rng = np.random.default_rng(1)
+    motion = Motion(np.arange(5) * 0.01, *rng.standard_normal((6, 5, robot.n)))
+    effect = make_effect(
+        "external_force", joint, **{f"point_{axis}": float(v) for axis, v in zip("xyz", point, strict=True)}
+    )
+    rows = effect.evaluate(State(robot, motion)).link @ FORCE
+    for k, (q, dq) in enumerate(zip(motion.q, motion.dq, strict=True)):
+        ahead, behind = (place(robot, joint, q + sign * STEP * dq, point) for sign in (1.0, -1.0))
+        power = FORCE @ (ahead - behind) / (2.0 * STEP)
+        assert rows[k] @ dq == pytest.approx(-power, rel=1e-6, abs=1e-7)
+        link, motor = np.zeros(robot.n), np.zeros(robot.n)
+        rest = (dq, motion.theta[k], motion.dtheta[k], link, motor)
+        effect.torque(robot, FORCE)(SimulationState(0.0, q, *rest), link, motor)
+        np.testing.assert_allclose(link, rows[k], atol=1e-12)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(1.234, 2.718), (3.9, 0.35), (1.2, 1.2031)])
+def test_it_pushes_for_as_long_as_it_does_between_samples_too(start, stop):
+    """The sum of the shares is the time that it pushes, and where it pushes all the time they are one."""
+    period, samples = 4.0, 400
+    time = np.arange(samples) * period / samples
+    effect = make_effect("external_force", "knee", start=start, stop=stop, period=period)
+    share = effect.share_of(time)
+    assert np.sum(share) * period / samples == pytest.approx((stop - start) % period, abs=1e-9)
+    inside = effect.pushes(time - 0.5 * period / samples) & effect.pushes(time + 0.5 * period / samples)
+    if stop > start + 0.01:
+        np.testing.assert_allclose(share[inside], 1.0)
+    # the centre of gravity in time is where it should be
+    if stop > start:
+        assert np.sum(share * time) / np.sum(share) == pytest.approx(0.5 * (start + stop), abs=2e-3)
+    np.testing.assert_allclose(make_effect("external_force", "knee").share_of(time), 1.0)
