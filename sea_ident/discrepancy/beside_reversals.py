@@ -1,5 +1,6 @@
 """Friction that acts only beside reversals, in samples that a search leaves out: those are compared, for it alone."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
 from sea_ident.discrepancy.search import BESIDE_ANOTHER, MOST_EFFECTS, SMALLEST_SHARE, next_effect
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.effects import Effect
 from sea_ident.effects.coulomb_friction import CoulombFriction
 
 SPEEDS = 12
@@ -44,7 +46,8 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     added: list[float] = []
     begun: set[str | None] = set()
     while before.added + len(added) < MOST_EFFECTS:
-        step = _next(near, now, before.start.fit)
+        few = [e for e in candidate_effects(near, now.fit.effects) if e.name in LIVE_BESIDE_REVERSALS]
+        step = _next(near, now, before.start.fit, few)
         if step is None:
             break
         joint = step[0].effects[-1].joint
@@ -54,6 +57,10 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
             if again.fit.statistic < now.fit.statistic - EQUALLY_GOOD:
                 now = again
                 continue
+        # all others only where one of the few may be it: mostly none is
+        step = _next(near, now, before.start.fit, None)
+        if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:
+            break
         added.append(step[1])
         now = settle_again(near, settle_again(near, step[0]).fit)
     if not added:
@@ -94,16 +101,9 @@ def with_sliding_start(near: Bench, now: Settled, joint: str | None) -> Settled:
     return now if best is now.fit else settle_again(near, best)
 
 
-def _next(near: Bench, now: Settled, start: Fit) -> tuple[Fit, float] | None:
-    """The friction that acts beside reversals refitted with everything free, and its significance."""
+def _next(near: Bench, now: Settled, start: Fit, effects: Sequence[Effect] | None) -> tuple[Fit, float] | None:
+    """The best of some effects, or of the whole library, refitted with everything free, and its significance."""
     change = torque_changes(near, start, now.fit) if len(now.fit.effects) > len(start.effects) else 0.0
     smallest = np.broadcast_to(np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * change), now.fit.scale.shape)
-    few = [effect for effect in candidate_effects(near, now.fit.effects) if effect.name in LIVE_BESIDE_REVERSALS]
-    step: tuple[Fit, float] | None = None
-    for effects in (few, None):
-        # all others only where one of the few may be it: mostly none is
-        candidates = scan(near, now.fit, now.noise, effects)
-        step = next_effect(near, now, candidates, max(sum(c.tests for c in candidates), 1), smallest)
-        if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:
-            return None
-    return step
+    candidates = scan(near, now.fit, now.noise, effects)
+    return next_effect(near, now, candidates, max(sum(c.tests for c in candidates), 1), smallest)

@@ -159,7 +159,11 @@ class Relative(Effect):
         if self.driver is not None:
             shapes = {shape.name: getattr(self, shape.name) for shape in self.shapes}
             return _rows_there(replace(self.driver, **shapes), state, str(self.joint))
-        part = super().evaluate(state)  # type: ignore[safe-super]
+        if self.only is not None and isinstance(self, TorqueConstant):
+            # what one way only loses is lost in the gear, and what the rotor takes for itself does not pass that
+            part = state.at(Side.MOTOR, self.at, self.column_of(self.load(state), state.motion.dtheta[:, 0]))
+        else:
+            part = super().evaluate(state)  # type: ignore[safe-super]
         factor = self._factor(state)[:, None, None]
         return Contribution(part.link * factor, part.motor * factor, part.joint)
 

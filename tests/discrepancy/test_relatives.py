@@ -170,9 +170,10 @@ def test_one_for_two_is_told_where_the_sign_of_friction_is_known(nothing_missing
     """With samples beside reversals the two have sizes of their own, for there friction is not what a model says."""
     bench, start = nothing_missing
     both = [make_effect(name, "knee") for name in ("torque_constant", "load_dependent_friction")]
-    anchored = bench.anchored((*start.fit.effects, *both), start.fit.parameters)[-2:]
-    rows = [e.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0] for e in anchored]
-    whole, far = (with_torque(bench, (KNEE, 0.1 * rows[0] + size * rows[1])) for size in (0.13, 0.1))
+    constant, friction = bench.anchored((*start.fit.effects, *both), start.fit.parameters)[-2:]
+    state = bench.state(start.fit.effects)
+    rows = [constant.load(state), friction.evaluate(state).motor[:, KNEE, 0]]
+    whole, far = (with_torque(bench, (KNEE, 0.1 * rows[0] + size * rows[1])) for size in (0.2, 0.1))
     selection = found(whole, *both)
     assert unnamed(whole, selection, None) == ()
     (one,) = unnamed(whole, selection, None, (far, settle_again(far, selection.final.fit)))

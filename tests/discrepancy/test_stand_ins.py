@@ -54,7 +54,7 @@ def test_what_changes_along_the_path_is_no_ripple(nothing_missing, angle):
 
 def test_a_wave_of_which_the_motion_shows_but_a_part_keeps_its_name(nothing_missing, angle):
     """It ended as the longest too, but with nothing left beside it."""
-    bench, selection = ripple_found(nothing_missing[0], np.sin(angle[0] + 0.4), 0.5)
+    bench, selection = ripple_found(nothing_missing[0], np.sin(0.45 * angle[0] + 0.4), 0.5)
     assert slowest(selection.effects[0])
     assert stand_ins(bench, selection) == ()
 
