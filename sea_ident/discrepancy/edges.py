@@ -26,6 +26,12 @@ POINT_ROUNDS = 4
 ENOUGH = 0.05
 """... or fewer, once the point takes less than this share of the excess."""
 
+FIRST_PART = 0.5
+"""Step in samples from which on edges are moved to less than a sample."""
+
+FAR_ABOVE = 4.0
+"""Times the statistic of interest from which on neither less than a sample nor a point makes a push the better one."""
+
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
 
@@ -33,7 +39,7 @@ ABSORBED = 1e-6
 """A component of a push of which the model leaves less than this share of its power is not looked at."""
 
 
-def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat: float = np.inf) -> Fit:
     """A fit with the begin and the end of a push where they fit best, down to one sample.
 
     The statistic jumps from sample to sample and has minima of its own far from the best window, so there is no
@@ -45,6 +51,7 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -
         fit: a model with a push.
         noise: noise floor.
         position: of the push among the effects.
+        beat: statistic that is of interest; what is far above with edges to the sample is left so.
 
     Returns:
         The fit.
@@ -54,12 +61,14 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -
         return fit
     stride = max(bench.data.samples // INSTANTS, 1)
     wide = _with(fit, position, *_best_window(bench, fit, noise, position, stride), bench, noise)
-    fit = _sharpened(bench, min(fit, wide, key=lambda each: each.statistic), noise, position, stride)
+    fit = _sharpened(bench, min(fit, wide, key=lambda each: each.statistic), noise, position, stride, 1.0)
     # what pushes all the time but then is nearly the same as what pushes then, for a model takes up a constant force
     start, stop = (getattr(fit.effects[position], name) for name in ("start", "stop"))
     fit = min(fit, _with(fit, position, stop, start, bench, noise), key=lambda each: each.statistic)
-    fit = _sharpened(bench, fit, noise, position, 1)
-    return _with_point(bench, fit, noise, position)
+    fit = _sharpened(bench, fit, noise, position, 1, 1.0)
+    if fit.statistic > FAR_ABOVE * beat:
+        return bench.fit(fit.effects, noise, start=fit.parameters)
+    return _with_point(bench, _sharpened(bench, fit, noise, position, FIRST_PART), noise, position)
 
 
 def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
@@ -81,11 +90,13 @@ def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit
     return bench.fit(fit.effects, noise, start=fit.parameters)
 
 
-def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: float) -> Fit:
-    """A fit with the edges of a push moved by smaller and smaller steps, from so many samples to a part of one."""
+def _sharpened(
+    bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: float, finest: float = FINEST_STEP
+) -> Fit:
+    """A fit with the edges of a push moved by smaller and smaller steps, from so many samples to the finest."""
     period = bench.data.period
     interval = period / bench.data.samples
-    while step >= FINEST_STEP:
+    while step >= finest:
         better = fit
         for moves in ((1, 0), (0, 1), (1, 1)):
             for sign in (-1, 1):

@@ -75,7 +75,7 @@ def refitted(
         anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
         if tuple(anchored) != best.effects:
             best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects), beat=beat)
-    return with_sharp_edges(bench, best, noise, len(before))
+    return with_sharp_edges(bench, best, noise, len(before), beat)
 
 
 def _share(effect: SignalEffect, amount: Shape) -> float:
