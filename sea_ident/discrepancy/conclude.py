@@ -30,11 +30,11 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
-from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import longest_standing
 from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects.signal import SignalEffect
 
 FEWEST_PERIODS = 10

@@ -25,13 +25,13 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
-from sea_ident.discrepancy.relatives import Unnamed, unnamed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, without
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
+from sea_ident.discrepancy.unnamed import Unnamed, unnamed
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.estimation import Model

@@ -13,11 +13,11 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.free_shapes import is_signal
-from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import EQUALLY_GOOD, UNEXPLAINED, Trend, TrendTest, trend_excess
 from sea_ident.discrepancy.trend_directions import Cause, Direction, PeriodColumns, courses, flat_periods
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
+from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects import Column, Contribution, Effect, Side, State
 from sea_ident.effects.drift import DriftEffect
 from sea_ident.effects.external_force import ExternalForce

@@ -1,63 +1,26 @@
-"""Nameless relatives of what was found: effects of nearly the same form that the library does not have.
+"""Relatives of an effect: effects of nearly the same form that the library does not have.
 
-A search takes the nearest that there is. A ripple that grows with the load is found as a ripple, at the right joint and
-of the right order, and most of the gap goes with it; friction whose viscous part changes over the turn is found as
-friction whose dry part does. So every effect that was found is held against its own columns times a signal that they
-do not depend on, and against the same effect driven by another joint. Where one of these *in its place* fits better by
-long odds and leaves no more than noise, or hardly anything of what the named effect leaves, the named one is not what
-is there. Whether what the named one leaves stands out of noise does not matter.
-
-What depends on a signal already is not multiplied by it: friction that grows with another power of the speed is still
-friction that grows with the speed.
-
-Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
-half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
-loss less a torque constant, which is one whose sign turns with the direction. Where one that does all that both do fits
-as well alone, with a parameter less, the two are not what is there. An encoder that errs at a joint and a torque of its
-motor that changes along the path are together a torque on the link: the same effect there is asked too.
+Its own columns times a signal that they do not depend on, the same effect driven by another joint, in one direction of
+motion or of the load only, turned in it, or on the other side of the spring. What depends on a signal already is not
+multiplied by it: friction that grows with another power of the speed is still friction that grows with the speed.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
-from itertools import combinations
 from typing import ClassVar, Self
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import Candidate, scan
-from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
-from sea_ident.discrepancy.heldout import HeldOut
-from sea_ident.discrepancy.judge import EQUALLY_GOOD
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Anchor, Column, Contribution, Effect, JointEffect, Side, State
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.load import LoadEffect, MotorLoadEffect
 from sea_ident.effects.torque_constant import TorqueConstant
 from sea_ident.robot import Robot
-
-LEAVES = 0.3
-"""Share of the excess that a relative may leave of what the named effect leaves to be taken for the truth, unless it
-leaves no more than noise [-]."""
-
-PROMISED = 0.5
-"""Share of what the named effect explains that a relative must promise to explain before it is fitted [-]."""
-
-TRIED = 2
-"""Relatives of an effect that are fitted, those that promise most."""
-
-TRIED_FOR_TWO = 4
-"""Relatives in the place of two effects that are fitted: each of the two in the directions that promise most."""
-
-ALL_OF_IT = 0.9
-"""Share of what two effects explain that one in the place of both must promise before it is fitted [-]."""
 
 FASTER = 1.5
 """Factor of the speed by which it is tried whether columns depend on it [-]."""
@@ -96,40 +59,6 @@ class Only(StrEnum):
 _TURNS = (Only.TURNS_DRIVEN, Only.TURNS_BACKWARD, Only.TURNS_UNDER_LOAD)
 _LOADS = (Growth.LOAD, Growth.LOAD_MAGNITUDE)
 _SPEEDS = (Growth.SPEED, Growth.SPEED_MAGNITUDE)
-
-
-@dataclass(frozen=True)
-class Unnamed:
-    """An effect that was found and a relative without a name that explains the recording much better.
-
-    Attributes:
-        effect: name of what was found.
-        joint: its joint.
-        relative: how the other differs, in words.
-        share: what it leaves of what the named one leaves [-].
-        fit: the whole model with it in the place of the effect.
-        second: name of another effect of the joint in the place of which it is too, None where there is none.
-    """
-
-    effect: str
-    joint: str | None
-    relative: str
-    share: float
-    fit: Fit
-    second: str | None = None
-
-    @property
-    def sentence(self) -> str:
-        """What it explains."""
-        if self.second is not None:
-            return (
-                f"{self.effect} and {self.second} at {self.joint} are what one effect alone does as well: "
-                f"{self.relative}, with a parameter less."
-            )
-        same = f"The same as {self.effect} at {self.joint}, but {self.relative},"
-        if self.share > LEAVES:
-            return f"{same} leaves no more than noise, and fits better by odds of more than a thousand to one."
-        return f"{same} leaves {100 * self.share:.2g} % of what that one leaves."
 
 
 @dataclass(frozen=True)
@@ -236,31 +165,6 @@ def relatives_of(bench: Bench, model: Sequence[Effect], effect: Effect) -> tuple
     )
 
 
-def unnamed(
-    bench: Bench, selection: Selection, held: HeldOut | None, away: tuple[Bench, Settled] | None = None
-) -> tuple[Unnamed, ...]:
-    """Effects that were found in the place of which a relative explains the recording much better.
-
-    Args:
-        bench: the recording.
-        selection: what was found.
-        held: data that were not used; what a relative explains must hold on another motion too.
-        away: the recording with more left out around the reversals, and the model with what was found there: whether
-            one effect does what two do is told where the sign of friction is known; the recording itself by default.
-
-    Returns:
-        One entry for every such effect, with its best relative.
-    """
-    now = selection.final
-    pairs = _one_for_two(*(away or (bench, now)), selection, held)
-    first, found = len(now.fit.effects) - selection.added, []
-    for k in range(selection.added):
-        best = _best(bench, now, first + k)
-        if best is not None and _holds(best, selection, held, k):
-            found.append(best)
-    return (*pairs, *found)
-
-
 def one_sided(effect: Effect) -> tuple[Relative, ...]:
     """An effect in one direction only or turned in it, in each; none of what is no torque of a single joint always."""
     if effect.joint is None or is_signal(effect) or isinstance(effect, ExternalForce):
@@ -278,98 +182,6 @@ def behind_the_spring(bench: Bench, effect: Effect) -> tuple[Effect, ...]:
         return ()
     own = {item.name: getattr(effect, item.name) for item in fields(effect)}
     return (_behind(type(effect))(**own),)
-
-
-def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
-    """Pairs of effects that were found at one joint where one alone does as well as both."""
-    fit, noise = now.fit, now.noise
-    first = len(fit.effects) - selection.added
-    found = []
-    for one, other in combinations(range(first, len(fit.effects)), 2):
-        own, second = fit.effects[one], fit.effects[other]
-        if own.joint != second.joint:
-            continue
-        family: tuple[Effect, ...] = (*behind_the_spring(bench, own), *behind_the_spring(bench, second))
-        if own.side is second.side:
-            family = (*one_sided(own), *one_sided(second), *family)
-        if not family:
-            continue
-        others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
-        reduced = bench.fit(others, noise, start=fit.parameters)
-        gain = reduced.statistic - fit.statistic
-        unit = max(fit.statistic / max(fit.dof, 1), 1.0)
-        for candidate in scan(bench, reduced, noise, family)[:TRIED_FOR_TWO]:
-            if candidate.gain < ALL_OF_IT * gain:
-                break
-            # the load is that of the model with both: without them it bends
-            relative = bench.anchored((*others, candidate.effect), fit.parameters)[-1]
-            new = refitted(bench, others, relative, (), noise, fit.parameters)
-            if new.statistic - fit.statistic > EQUALLY_GOOD * unit:
-                # the shapes of the model are those beside the two
-                new = bench.refine(new.effects, noise, start=new.parameters)
-            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and _transfers(new, selection, held):
-                share = new.excess / max(fit.excess, 1.0)
-                found.append(Unnamed(own.name, own.joint, _in_words(candidate), share, new, second.name))
-                break
-    return tuple(found)
-
-
-def _transfers(fit: Fit, selection: Selection, held: HeldOut | None) -> bool:
-    """Whether the last effect of a fit with one effect less explains another motion as well."""
-    if held is None or not held.other_motion:
-        return True
-    fewer = replace(selection, final=replace(selection.final, fit=fit), added=selection.added - 1)
-    return held.again(fewer).transfers[-1].holds
-
-
-def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int) -> bool:
-    """Whether a relative explains another motion as well, and better than the effect that was found."""
-    if held is None or not held.other_motion:
-        return True
-    replaced = replace(selection, final=replace(selection.final, fit=relative.fit))
-    rival, own = held.again(replaced).transfers[k], held.transfers[k]
-    return rival.holds and rival.statistic < own.statistic
-
-
-def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
-    fit, noise = now.fit, now.noise
-    own = fit.effects[position]
-    others = [e for k, e in enumerate(fit.effects) if k != position]
-    family = relatives_of(bench, fit.effects, own)
-    if not family:
-        return None
-    reduced = bench.fit(others, noise, start=fit.parameters)
-    gain = reduced.statistic - fit.statistic
-    best: Unnamed | None = None
-    better = EQUALLY_GOOD + 2.0 * float(np.log(len(family)))
-    for candidate in scan(bench, reduced, noise, family)[:TRIED]:
-        if candidate.gain < PROMISED * gain:
-            continue
-        new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
-        if new.excess > LEAVES * fit.excess:
-            # the shapes of the model are those beside the named effect
-            new = bench.refine(new.effects, noise, start=new.parameters)
-        unit = max(new.statistic / max(new.dof, 1), 1.0)
-        share = new.excess / max(fit.excess, 1.0)
-        if fit.statistic - new.statistic < better * unit:
-            continue
-        if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
-            continue
-        if best is None or share < best.share:
-            best = Unnamed(own.name, own.joint, _in_words(candidate), share, new)
-    return best
-
-
-def _in_words(candidate: Candidate) -> str:
-    relative = candidate.effect
-    if isinstance(relative, BehindTheSpring):
-        return f"{relative.name} on the link"
-    if isinstance(relative, Relative) and relative.only is not None:
-        return f"{relative.name} {relative.only}"
-    if isinstance(relative, Relative) and relative.growth is not None:
-        return f"growing with the {relative.growth}"
-    driver = relative.driver if isinstance(relative, Relative) else None
-    return f"driven by {driver.joint if driver is not None else 'another joint'}"
 
 
 def _depends(state: State, effect: Effect, growth: Growth) -> bool:

@@ -19,8 +19,8 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import slowest
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.parallel_spring import ParallelSpring
 

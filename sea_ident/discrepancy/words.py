@@ -8,9 +8,9 @@ from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.reference import ParameterChange
-from sea_ident.discrepancy.relatives import Unnamed
 from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.discrepancy.unnamed import Unnamed
 
 FEW_PERIODS = 10
 

@@ -15,10 +15,11 @@ from sea_ident.discrepancy.conclude import conclude
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.relatives import Growth, relatives_of, unnamed
+from sea_ident.discrepancy.relatives import Growth, relatives_of
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.discrepancy.unnamed import unnamed
 from sea_ident.effects import Effect, make_effect
 
 HIP, KNEE, ANKLE = range(3)
