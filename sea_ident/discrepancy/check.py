@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import EquationKind, PeriodData, mean_of_periods
+from sea_ident.discrepancy.closing import mean_of_periods
+from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
+from sea_ident.discrepancy.closing import SIGNALS, closing_weights, mean_of_periods
 from sea_ident.effects import Contribution
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import Motion
@@ -51,12 +52,6 @@ sliding start of friction and what friction remembers of a reversal stay visible
 BARELY_SEEN = 1e-3
 """... but from this on where a model is judged: a jump of friction that falls between two samples is many times the
 noise."""
-
-
-SIGNALS = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
-
-FEWEST_TO_CLOSE = 6
-"""Periods from which on a part of one is given for a mean that closes."""
 
 
 class EquationKind(StrEnum):
@@ -159,42 +154,6 @@ class PeriodData:
             if equation.kind is not EquationKind.LINK:
                 out[:, e] += tau_motor[:, equation.index]
         return out
-
-
-def closing_weights(places: Sequence[int], samples: int) -> FloatArray:
-    """(N, P) weights of the periods in a mean that closes: each phase adds up to one.
-
-    The plain mean of P periods begins with the begin of the first and ends with the end of the last; what lies between
-    them is noise, and where noise is differentiated that jump is seen in all harmonics. So a period that follows none
-    is faded in, and one that none follows is faded out: what the mean ends with is then what it begins with. It is as
-    noisy as a plain mean of a third of a period less. Of few periods that would be much: fewer than `FEWEST_TO_CLOSE`
-    are averaged as they are.
-
-    Args:
-        places: (P,) number of every period in the recording, rising.
-        samples: N of a period.
-    """
-    follows = np.diff(np.asarray(places)) == 1
-    weights = np.ones((samples, len(places)))
-    if np.count_nonzero(follows) >= FEWEST_TO_CLOSE - 1:
-        phase = np.arange(samples) / samples
-        fade = np.sin(np.pi * phase) ** 2
-        weights[:, np.concatenate([[True], ~follows])] *= np.where(phase < 0.5, fade, 1.0)[:, None]
-        weights[:, np.concatenate([~follows, [True]])] *= np.where(phase > 0.5, fade, 1.0)[:, None]
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True), dtype=np.float64)
-
-
-def mean_of_periods(motions: Sequence[Motion], tau: FloatArray, places: Sequence[int]) -> tuple[Motion, FloatArray]:
-    """Mean motion and torque (N, n) of periods, with the weights of `closing_weights`.
-
-    Args:
-        motions: (P,) of the periods.
-        tau: (P, N, n) motor torques [N m].
-        places: (P,) number of every period in the recording, rising.
-    """
-    weights = closing_weights(places, tau.shape[1])
-    parts = (np.einsum("tp,pti->ti", weights, [getattr(m, name) for m in motions]) for name in SIGNALS)
-    return Motion(motions[0].time, *parts), np.asarray(np.einsum("tp,pti->ti", weights, tau), dtype=np.float64)
 
 
 def towards(mean: Motion, motions: Sequence[Motion], share: float) -> tuple[Motion, ...]:

@@ -1,12 +1,13 @@
 """The periods of a recording in the light of a model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.data import FEWEST_TO_CLOSE, PeriodData, spectrum, towards
+from sea_ident.discrepancy.closing import successive
+from sea_ident.discrepancy.data import PeriodData, spectrum, towards
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
@@ -121,26 +122,6 @@ class Periods:
                 found.append((State(self.robot, thin, state.channels), rows))
             self._period_bodies[signals] = found
         return self._period_bodies[signals]
-
-
-def successive(values: FloatArray, places: Sequence[int]) -> FloatArray:
-    """(N, S, ...) steps between successive periods (N, P, ...) over the root of two, that close where there are enough.
-
-    Args:
-        values: what every period differs by from the mean.
-        places: (P,) number of every period in the recording, rising.
-    """
-    follows = np.diff(np.asarray(places)) == 1
-    if np.count_nonzero(follows[1:] & follows[:-1]) < FEWEST_TO_CLOSE - 2:
-        return np.asarray(np.diff(values, axis=1) / np.sqrt(2.0), dtype=np.float64)
-    phase = np.arange(len(values)) / len(values)
-    turn = 2.0 / 3.0 * (np.pi * phase - 0.5 * np.sin(2.0 * np.pi * phase))
-    # a^2 - a b + b^2 = 1: steps between a period with b times the one before keep the energy of plain ones
-    before = (2.0 / np.sqrt(3.0) * np.sin(turn)).reshape(-1, *[1] * (values.ndim - 1))
-    own = np.cos(turn).reshape(before.shape) + 0.5 * before
-    closed = own * values[:, 1:] + before * values[:, :-1]
-    steps = np.diff(closed, axis=1)[:, follows[1:] & follows[:-1]]
-    return np.asarray(steps / np.sqrt(2.0), dtype=np.float64)
 
 
 def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:

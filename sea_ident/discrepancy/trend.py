@@ -9,7 +9,7 @@ from scipy.interpolate import interp1d
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import closing_weights
+from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom

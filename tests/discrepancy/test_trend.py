@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.discrepancy import check
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import closing_weights
+from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import Trend, _omnibus, compare_periods, within_periods
 from sea_ident.effects import effect_classes, make_effect

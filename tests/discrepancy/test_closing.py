@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.data import closing_weights, mean_of_periods, spectrum
+from sea_ident.discrepancy.closing import closing_weights, mean_of_periods, successive
+from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.noise import closed_freedom
-from sea_ident.discrepancy.periods import successive
 from sea_ident.motion import Motion
 
 SAMPLES = 400
