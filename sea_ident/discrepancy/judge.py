@@ -29,6 +29,9 @@ FEWEST_TO_SEARCH = 4
 
 Of three periods with nothing missing a fifth got a name."""
 
+ALL_THE_TIME = 0.75
+"""Share of a period from which on a push is none: what pauses now and then acts all the time [-]."""
+
 SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 """Parameters of the law of a spring with two equal sides."""
 
@@ -105,15 +108,15 @@ def at_a_bound(effect: Effect) -> bool:
 
 
 def too_short(bench: Bench, effect: Effect) -> bool:
-    """Whether a push, or the pause before it comes again, is shorter than what is compared can show.
+    """Whether a push is shorter than what is compared can show, or lasts nearly all the time.
 
-    Then it only stands in for something sudden, or for a constant.
+    Then it only stands in for something sudden, or for what acts all the time.
     """
     if not isinstance(effect, ExternalForce):
         return False
     period = bench.data.period
-    length = float(np.mod(effect.stop - effect.start, period)) + period / bench.data.samples
-    return min(length, period - length) < period / (2.0 * bench.data.harmonics)
+    length = float(np.mod(effect.stop - effect.start, period))
+    return length < period / (2.0 * bench.data.harmonics) or length > ALL_THE_TIME * period
 
 
 def torque_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
@@ -132,7 +135,9 @@ def penalty(effect: Effect, bench: Bench) -> float:
 
     A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one.
     """
-    count = len(effect.columns(bench.robot)) + len(free_shapes((effect,)))
+    # when a push begins and ends is found too, though not by refinement
+    shapes = len(effect.shapes) if isinstance(effect, ExternalForce) else len(free_shapes((effect,)))
+    count = len(effect.columns(bench.robot)) + shapes
     price = count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
     return price + (EQUALLY_GOOD if slowest(effect) else 0.0)
 
