@@ -153,10 +153,10 @@ def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
     ("planted", "said"),
     [
         ([("parallel_spring", "knee", (6.0, 1.0), {})], ["torque_ripple on the link"]),
-        (
+        pytest.param(
             [("torque_ripple", "knee", (0.8, 0.3), {"order": 9.0}),
              ("encoder_eccentricity", "knee", (), {"sine": 0.01, "cosine": 0.006})],
-            [],
+            [], marks=pytest.mark.slow,
         ),
     ],
 )  # fmt: skip

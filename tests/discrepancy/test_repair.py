@@ -107,6 +107,7 @@ def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(leg,
         assert springs[name].stiffness == pytest.approx(truth.stiffness[i], rel=0.01)
 
 
+@pytest.mark.slow
 def test_friction_that_acts_only_beside_reversals_comes_from_the_diagnosis(leg, series):
     """`identify` leaves out what is slower than twice the smoothing of the sign, and sees only its tail beyond."""
     effect = planted("stribeck_friction", "knee", [0.8], speed=0.05, exponent=2.0)

@@ -65,6 +65,7 @@ def test_more_caution_leaves_out_more_and_nothing_else(lingering):
     np.testing.assert_array_equal(far.tau_motor, lingering.tau_motor)
 
 
+@pytest.mark.slow
 def test_the_search_goes_on_from_what_explains_nearly_all(lingering, monkeypatch):
     """A large offset is plain with the slow samples too; only the ripple is looked for without them."""
     leg = lingering.robot
