@@ -40,9 +40,9 @@ ABSORBED = 1e-6
 
 
 def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat: float = np.inf) -> Fit:
-    """A fit with the begin and the end of a push where they fit best, down to one sample.
+    """A fit with the begin and the end of a push where they fit best, down to a part of a sample.
 
-    The statistic jumps from sample to sample and has minima of its own far from the best window, so there is no
+    The statistic bends at every sample and has minima of its own far from the best window, so there is no
     derivative to follow: all windows are compared first, then the edges of the best are moved by smaller and smaller
     steps.
 

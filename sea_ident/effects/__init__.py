@@ -21,10 +21,9 @@ from sea_ident.effects.base import (
     Shape,
     Side,
     State,
-    corrected_motion,
-    measured_signals,
     smooth_sign,
 )
+from sea_ident.effects.signal import corrected_motion, measured_signals
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

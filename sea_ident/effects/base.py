@@ -12,7 +12,7 @@ and their sum is the row of a rigid joint, in which the spring cancels (paper, e
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
@@ -377,27 +377,6 @@ class JointEffect(Effect):
         """Units of torque and of position of its joint: (N m, rad) or (N, m)."""
         joint = robot.joints[robot.index(self.required_joint)]
         return joint.torque_unit, joint.position_unit
-
-
-def corrected_motion(robot: Robot, effects: Sequence[Effect], motion: Motion) -> Motion:
-    """The motion with the errors of all sensors taken out that the effects of a model describe, in whatever order."""
-    for effect in sorted(effects, key=_depth):
-        motion = effect.corrected(robot, motion)
-    return motion
-
-
-def measured_signals(
-    robot: Robot, effects: Sequence[Effect], time: FloatArray, signals: Mapping[str, FloatArray]
-) -> dict[str, FloatArray]:
-    """The signals as recorded, with all that the effects do to them: the way back of `corrected_motion`."""
-    shown = dict(signals)
-    for effect in reversed(sorted(effects, key=_depth)):
-        shown = effect.measured(robot, time, shown)
-    return shown
-
-
-def _depth(effect: Effect) -> int:
-    return effect.depth
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

@@ -1,7 +1,7 @@
 """Effects in the chain of signals: encoders that err, signals that come late."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -123,3 +123,24 @@ def _replaced(values: FloatArray, column: int, new: FloatArray) -> FloatArray:
     out = values.copy()
     out[:, column] = new
     return out
+
+
+def corrected_motion(robot: Robot, effects: Sequence[Effect], motion: Motion) -> Motion:
+    """The motion with the errors of all sensors taken out that the effects of a model describe, in whatever order."""
+    for effect in sorted(effects, key=_depth):
+        motion = effect.corrected(robot, motion)
+    return motion
+
+
+def measured_signals(
+    robot: Robot, effects: Sequence[Effect], time: FloatArray, signals: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """The signals as recorded, with all that the effects do to them: the way back of `corrected_motion`."""
+    shown = dict(signals)
+    for effect in reversed(sorted(effects, key=_depth)):
+        shown = effect.measured(robot, time, shown)
+    return shown
+
+
+def _depth(effect: Effect) -> int:
+    return effect.depth

@@ -14,7 +14,7 @@ from scipy.linalg import lapack
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.base_parameters import BaseParameters, random_motion
 from sea_ident.effects import Effect, State
-from sea_ident.effects.base import corrected_motion
+from sea_ident.effects.signal import corrected_motion
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.regressor import build_total

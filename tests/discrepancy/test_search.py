@@ -51,6 +51,13 @@ def test_the_small_one_would_not_count_at_the_joint_of_the_large_one(unequal):
     assert np.any(changes["hip"] > BESIDE_ANOTHER * changes["knee"])
 
 
+def test_when_a_push_begins_and_ends_is_paid_for(nothing_missing):
+    """A force of three components that meets the link anywhere at any time: eight parameters, an offset has one."""
+    bench = nothing_missing[0]
+    push, offset = (penalty(make_effect(name, "knee"), bench) for name in ("external_force", "torque_offset"))
+    assert push == pytest.approx(8.0 * offset)
+
+
 def test_a_torque_constant_is_all_that_a_motor_with_another_one_lacks(nothing_missing):
     """Of three motors that share one rotor inertia the torque of one is recorded two fifths too large."""
     data = nothing_missing[0].data

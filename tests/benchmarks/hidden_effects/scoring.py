@@ -49,6 +49,7 @@ class Score:
         seen: whether it says that something is missing.
         found: entries of `missing`.
         lack_of_fit_p: p-value of the lack of fit.
+        lack_of_fit_ratio: its statistic over its degrees of freedom.
         shrink_holdout: share of the held-out gap that is gone.
         shrink_simulation: the same of q in forward simulation; NaN where absent.
         seconds: of the diagnosis.
@@ -60,6 +61,7 @@ class Score:
     seen: bool
     found: tuple[Found, ...]
     lack_of_fit_p: float
+    lack_of_fit_ratio: float
     shrink_holdout: float
     shrink_simulation: float
     seconds: float
@@ -132,6 +134,7 @@ def score_case(root: Path, truth: Path) -> Score | None:
         seen=verdict not in ("none", "cannot_tell", "error"),
         found=found,
         lack_of_fit_p=_number(lack.get("p_value")),
+        lack_of_fit_ratio=_number(lack.get("statistic")) / max(_number(lack.get("dof")), 1.0),
         shrink_holdout=_number(gap.get("shrink_holdout")),
         shrink_simulation=_shrink(simulated),
         seconds=_number(record.get("seconds")),

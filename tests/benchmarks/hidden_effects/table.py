@@ -89,6 +89,10 @@ def lines_of(scores: list[Score]) -> list[Line]:
         add(_share("none", f"lack of fit at nominal 5 %, P = {periods}", "3-8 %",
                    (s.lack_of_fit_p < 0.05 for s in none if math.isfinite(s.lack_of_fit_p)),
                    lambda x: 0.03 <= x <= 0.08))  # fmt: skip
+        ratios = [s.lack_of_fit_ratio for s in none if math.isfinite(s.lack_of_fit_ratio)]
+        if ratios:
+            mean = float(np.mean(ratios))
+            add(Line("none", f"statistic over degrees of freedom, mean, P = {periods}", "-", value=mean, met=True))
         add(_share("none", f"verdict none, P = {periods}", "-", (s.verdict == "none" for s in none), lambda x: True))
     for row in ("one", "one_small", "other_form", "weak"):
         _single(row, by_row[row], add)
