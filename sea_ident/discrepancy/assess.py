@@ -8,7 +8,8 @@ from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import ABSORBED, Candidate, effect_key, scan
+from sea_ident.discrepancy.candidates import ABSORBED, Candidate, scan, sought
+from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit, Known
@@ -67,7 +68,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
-        tried = [c for c in scan(bench, reduced, noise) if c.key != effect_key(own)]
+        scanned = scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
+        tried = [c for c in scanned if c.key != effect_key(own)]
         for candidate in of_every_kind(tried, RIVALS):
             if candidate.gain < 0.3 * gain:
                 continue

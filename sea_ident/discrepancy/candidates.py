@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.linear import whiten
@@ -38,8 +39,9 @@ ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
 
 
-Key = tuple[str, str | None, str]
-"""Name of an effect, its joint, and the other joint where there is one."""
+ELSEWHERE = 0.05
+"""Share of what is to be explained that must be in the equations of an effect for it to be looked at: what a refit of
+the model smears into others is less [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +78,6 @@ class Candidate:
         return 1.0 - float(np.sum(self.directions**2)) / total if total > 0.0 else 1.0
 
 
-def effect_key(effect: Effect) -> Key:
-    """Name, joint, and the other joint where there is one."""
-    return effect.name, effect.joint, str(getattr(effect, "other", "") or "")
-
-
 def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Every effect of the library at every place that the model does not have yet, and that shows in the mean."""
     present = {effect_key(effect) for effect in effects}
@@ -99,15 +96,30 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
     return tuple(found)
 
 
-def scan(bench: Bench, fit: Fit, noise: NoiseFloor, effects: Sequence[Effect] | None = None) -> list[Candidate]:
+def scan(
+    bench: Bench,
+    fit: Fit,
+    noise: NoiseFloor,
+    effects: Sequence[Effect] | None = None,
+    instead_of: "Sought | None" = None,
+) -> list[Candidate]:
     """How far every candidate would bring the statistic down, best first, and of those that do the same the simplest.
 
     On a motion that does not tell two effects apart, their gains differ by rounding alone.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        noise: its noise floor.
+        effects: what is compared; all of the library by default.
+        instead_of: what a candidate is to explain, where only those matter that may do so; anything by default.
     """
     left = fit.off(fit.whitened)
     # single precision is plenty for a comparison of normalised columns, and half the work
     model = _Model(fit, bench.whitener(noise), left, np.concatenate([fit.free, fit.basis], axis=1).astype(np.float32))
     effects = candidate_effects(bench, fit.effects) if effects is None else effects
+    if instead_of is not None:
+        effects = [effect for effect in effects if instead_of.concerns(bench.equations_of(effect))]
     tried = [shown for effect in effects if (shown := _promising(bench, model, effect)) is not None]
     found: list[Candidate] = []
     for some in _chunks(tried):
@@ -126,6 +138,28 @@ def scan(bench: Bench, fit: Fit, noise: NoiseFloor, effects: Sequence[Effect] | 
             if best is not None:
                 found.append(replace(best, effect=_with_smoothing_of(each.effect, best.effect)))
     return sorted(found, key=lambda c: (-float(f"{c.gain:.9g}"), penalty(c.effect, bench)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """What an effect explains, which another is to explain in its place.
+
+    Attributes:
+        shares: (E,) of it in every equation, in units of the noise there [-].
+    """
+
+    shares: FloatArray
+
+    def concerns(self, equations: IntArray | None) -> bool:
+        """Whether an effect that acts in these equations may explain it; None where that is not known."""
+        return equations is None or float(np.sum(self.shares[equations])) > ELSEWHERE
+
+
+def sought(without: Fit, with_it: Fit, noise: NoiseFloor) -> Sought:
+    """What is explained by the effect that two models differ by."""
+    change = np.abs(without.residual * without.scale[None] - with_it.residual * with_it.scale[None]) ** 2
+    power = np.sum(change / np.maximum(np.real(np.einsum("kee->ke", noise.covariance)), 1e-300), axis=0)
+    return Sought(power / max(float(np.sum(power)), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,9 @@ VARIANTS_KEPT = 3e8
 """Bytes of columns of candidates that are kept for the next search."""
 
 
+Key = tuple[str, str | None, str]
+"""Name of an effect, its joint, and the other joint where there is one."""
+
 DIGITS = 1e-7
 """Share of the largest column of an effect below which another is nothing but the digits of a description [-]."""
 
@@ -30,6 +33,7 @@ class Columns:
         self.robot = data.robot
         self._states: dict[tuple[Effect, ...], State] = {}
         self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
+        self._places: dict[Key, IntArray] = {}
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
 
     def state(self, effects: Sequence[Effect]) -> State:
@@ -55,6 +59,10 @@ class Columns:
             self._columns[key] = without_digits(self._spectra(effect.evaluate(self.state(signals)), signals))
         return self._columns[key]
 
+    def equations_of(self, effect: Effect) -> IntArray | None:
+        """Equations (e,) that an effect acts in, None where none of its kind at its place was evaluated yet."""
+        return self._places.get(effect_key(effect))
+
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
         """Columns of one effect in all its variants.
 
@@ -68,6 +76,7 @@ class Columns:
                 self._variants.clear()
             state = self.state(effects)
             self._variants[key] = self._touched([variant.evaluate(state) for variant in variants], signals)
+            self._places[effect_key(variants[0])] = self._variants[key][0]
         return self._variants[key]
 
     def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
@@ -114,6 +123,11 @@ class Columns:
             return effects
         anchor = Anchor(self.robot, effects, parameters)
         return tuple(effect.anchored(anchor) for effect in effects)
+
+
+def effect_key(effect: Effect) -> Key:
+    """Name, joint, and the other joint where there is one."""
+    return effect.name, effect.joint, str(getattr(effect, "other", "") or "")
 
 
 def without_digits(spectra: ComplexArray) -> ComplexArray:

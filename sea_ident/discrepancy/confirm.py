@@ -7,6 +7,7 @@ import numpy as np
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, search, without
@@ -22,7 +23,8 @@ PROMISING = 0.3
 """Share of the excess there that a candidate must promise to explain for the search to be repeated [-]."""
 
 NEARLY_ALL = 0.9
-"""Share of the excess from which on what was found with these samples is where the search begins without them [-]."""
+"""Share of the excess from which on what was found is where another search begins, with fewer samples or less that
+drifts [-]."""
 
 RESOLVED = 0.5
 """Share of the misfit that the repeated search may leave of what the first left there, where it leaves any [-]."""
@@ -83,6 +85,18 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     return found.less(without(bench, selection, weak)) if weak else found
 
 
+def explains_nearly_all(bench: Bench, start: Fit, final: Settled) -> bool:
+    """Whether what was found explains so much that another search may begin with it.
+
+    Args:
+        bench: the recording.
+        start: the model without anything added.
+        final: the model with the effects added.
+    """
+    nothing = bench.fit(bench.effects, final.noise, start=start.parameters)
+    return final.fit.excess < (1.0 - NEARLY_ALL) * nothing.excess
+
+
 def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     """Search again without the samples in which a motor hardly moves.
 
@@ -105,9 +119,8 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
     if most < PROMISING * first.excess:
         return None
-    nothing = far.fit(bench.effects, before.noise, start=confirmed.start.fit.parameters)
-    right = first.excess < (1.0 - NEARLY_ALL) * nothing.excess
-    found = search(far, bench.effects, confirmed.selection if right else None)
+    nearly = explains_nearly_all(far, confirmed.start.fit, before)
+    found = search(far, bench.effects, confirmed.selection if nearly else None)
     fit = found.final.fit
     explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
     if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):

@@ -13,7 +13,7 @@ from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
-from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
+from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
@@ -167,13 +167,18 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     before = compare_periods(bench, start.fit, temperature)
     found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
     if _names(found.trends) != _names(before):
-        found = _searched_mean(_less(bench, found.confirmed.final.fit, found.trends, temperature), temperature, tell)
+        first = found.confirmed
+        nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
+        again = _less(bench, first.final.fit, found.trends, temperature)
+        found = _searched_mean(again, temperature, tell, first.selection if nearly else None)
     bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
     return replace(found, bench=bench, confirmed=confirmed)
 
 
-def _searched_mean(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
-    confirmed = confirm(bench, search(bench, bench.effects))
+def _searched_mean(
+    bench: Bench, temperature: FloatArray | None, tell: Progress, begun: Selection | None = None
+) -> _Found:
+    confirmed = confirm(bench, search(bench, bench.effects, begun))
     notes: tuple[str, ...] = ()
     if unexplained(confirmed):
         tell("searching without what is slow", 0.35)

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import Key, effect_key, scan
+from sea_ident.discrepancy.candidates import scan, sought
+from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import penalty, physical, slowest, too_short
 from sea_ident.discrepancy.refit import of_every_kind, refitted
@@ -57,7 +58,7 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried) -> Settled:
         reduced = bench.fit(others, noise, start=fit.parameters)
         own, explained = effect_key(fit.effects[position]), max(reduced.statistic - fit.statistic, 1e-300)
         best = fit
-        rivals = [c for c in scan(bench, reduced, noise) if c.key != own]
+        rivals = [c for c in scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise)) if c.key != own]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
             promised = candidate.gain / explained
             last = tried.get((own, candidate.key))

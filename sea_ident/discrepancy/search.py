@@ -7,7 +7,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import Candidate, effect_key, scan
+from sea_ident.discrepancy.candidates import Candidate, scan
+from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.edges import sharpened
 from sea_ident.discrepancy.exchange import Outdone, Tried, exchange
 from sea_ident.discrepancy.fit import Fit
@@ -120,7 +121,8 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
     Args:
         bench: the recording.
         effects: the model.
-        begun: what was found with other samples left out, to go on from; nothing by default.
+        begun: what was found with other samples left out, or before what drifts was known, to go on from; nothing by
+            default.
 
     Returns:
         The model before and after, with what was added.
@@ -131,6 +133,7 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
     tried: Tried = {}
     if begun is not None and begun.added:
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
+        now, added = _eliminate(bench, now, added, begun.tests, fewest=0)
         now = exchange(bench, now, len(added), tried)
         largest = _largest_changes(bench, now.fit, len(added))
     while True:
@@ -145,13 +148,9 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
         largest = np.maximum(largest, visible_changes(bench, now.fit, new))
         added.append(p_value)
         last = now
-        now = settle_again(bench, new)
-        for _ in range(MOST_SETTLINGS):
-            before = now.fit.statistic / now.fit.dof
-            now = settle_again(bench, now.fit)
-            if now.fit.statistic / now.fit.dof > 0.98 * before:
-                break
-        now = exchange(bench, now, len(added), tried)
+        now = _settled(bench, settle_again(bench, new))
+        exchanged = exchange(bench, now, len(added), tried)
+        now = now if exchanged is now else _settled(bench, exchanged)
         sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
         now = now if sharp is now.fit else settle_again(bench, sharp)
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
@@ -163,6 +162,16 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
             break
     now, added = _eliminate(bench, now, added, tests)
     return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
+
+
+def _settled(bench: Bench, now: Settled) -> Settled:
+    """A model with its noise floor and what depends on its parameters, followed until they stand still."""
+    for _ in range(MOST_SETTLINGS):
+        before = now.fit.statistic / now.fit.dof
+        now = settle_again(bench, now.fit)
+        if now.fit.statistic / now.fit.dof > 0.98 * before:
+            break
+    return now
 
 
 def _largest_changes(bench: Bench, fit: Fit, added: int) -> FloatArray:
@@ -266,10 +275,12 @@ def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
     return np.minimum(torque_changes(bench, before, after), 2.0 * own_torque(bench, after, -1))
 
 
-def _eliminate(bench: Bench, now: Settled, added: list[float], tests: int) -> tuple[Settled, list[float]]:
-    """Take out effects that are no longer needed."""
+def _eliminate(
+    bench: Bench, now: Settled, added: list[float], tests: int, fewest: int = 1
+) -> tuple[Settled, list[float]]:
+    """Take out effects that are no longer needed, one after the other, down to the fewest."""
     added = list(added)
-    while len(added) > 1:
+    while len(added) > fewest:
         fit, noise = now.fit, now.noise
         first = len(fit.effects) - len(added)
         scores = []
