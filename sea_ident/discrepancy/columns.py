@@ -74,10 +74,16 @@ class Columns:
         if key not in self._variants:
             if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
                 self._variants.clear()
-            state = self.state(effects)
-            self._variants[key] = self._touched([variant.evaluate(state) for variant in variants], signals)
+            self._variants[key] = self.spectra_of_variants(variants, effects)
             self._places[effect_key(variants[0])] = self._variants[key][0]
         return self._variants[key]
+
+    def spectra_of_variants(
+        self, variants: Sequence[Effect], effects: Sequence[Effect]
+    ) -> tuple[IntArray, ComplexArray]:
+        """The same, of shapes that nobody will ask for again."""
+        state = self.state(effects)
+        return self._touched([variant.evaluate(state) for variant in variants], signal_effects(effects))
 
     def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
         """Equations with anything in them, and the spectra (H + 1, e, v, ...) of all parts there."""

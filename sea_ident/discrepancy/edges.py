@@ -3,15 +3,17 @@
 Where it meets the link is asked last: a point would bend to a window that is not yet right.
 """
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.linear import whiten
+from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 
 INSTANTS = 160
@@ -26,11 +28,11 @@ POINT_ROUNDS = 4
 ENOUGH = 0.05
 """... or fewer, once the point takes less than this share of the excess."""
 
-FIRST_PART = 0.5
-"""Step in samples from which on edges are moved to less than a sample."""
+MOST_MOVES = 4
+"""Times that edges are moved where the best of those within reach is the last of them."""
 
 FAR_ABOVE = 4.0
-"""Times the statistic of interest from which on neither less than a sample nor a point makes a push the better one."""
+"""Times the statistic of interest from which on neither finer edges nor a point make a push the better one."""
 
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
@@ -43,8 +45,7 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
     """A fit with the begin and the end of a push where they fit best, down to a part of a sample.
 
     The statistic bends at every sample and has minima of its own far from the best window, so there is no
-    derivative to follow: all windows are compared first, then the edges of the best are moved by smaller and smaller
-    steps.
+    derivative to follow: all windows are compared first, then those near the best in smaller steps.
 
     Args:
         bench: the recording.
@@ -61,21 +62,22 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
         return fit
     stride = max(bench.data.samples // INSTANTS, 1)
     wide = _with(fit, position, *_best_window(bench, fit, noise, position, stride), bench, noise)
-    fit = _sharpened(bench, min(fit, wide, key=lambda each: each.statistic), noise, position, stride, 1.0)
+    fit = min(fit, wide, key=lambda each: each.statistic)
     # what pushes all the time but then is nearly the same as what pushes then, for a model takes up a constant force
     start, stop = (getattr(fit.effects[position], name) for name in ("start", "stop"))
     fit = min(fit, _with(fit, position, stop, start, bench, noise), key=lambda each: each.statistic)
-    fit = _sharpened(bench, fit, noise, position, 1, 1.0)
     if fit.statistic > FAR_ABOVE * beat:
         return bench.fit(fit.effects, noise, start=fit.parameters)
-    return _with_point(bench, _sharpened(bench, fit, noise, position, FIRST_PART), noise, position)
+    if stride > 1:
+        fit = _sharpened(bench, fit, noise, position, float(stride), 1.0)
+    return _with_point(bench, _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP), noise, position)
 
 
 def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
     """A fit with the edges of all pushes from a position on moved a little: what was found since bent them before."""
     for position in range(first, len(fit.effects)):
         if isinstance(fit.effects[position], ExternalForce):
-            fit = _with_point(bench, _sharpened(bench, fit, noise, position, 1), noise, position)
+            fit = _with_point(bench, _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP), noise, position)
     return fit
 
 
@@ -86,31 +88,27 @@ def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit
         fit = bench.refine(fit.effects, noise, start=fit.parameters, only=position)
         if before - fit.statistic < ENOUGH * fit.excess:
             return fit
-        fit = _sharpened(bench, fit, noise, position, 1)
+        fit = _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP)
     return bench.fit(fit.effects, noise, start=fit.parameters)
 
 
-def _sharpened(
-    bench: Bench, fit: Fit, noise: NoiseFloor, position: int, step: float, finest: float = FINEST_STEP
-) -> Fit:
-    """A fit with the edges of a push moved by smaller and smaller steps, from so many samples to the finest."""
-    period = bench.data.period
-    interval = period / bench.data.samples
-    while step >= finest:
-        better = fit
-        for moves in ((1, 0), (0, 1), (1, 1)):
-            for sign in (-1, 1):
-                own = better.effects[position]
-                start, stop = (
-                    float(np.mod(getattr(own, name) + sign * move * step * interval, period))
-                    for name, move in zip(("start", "stop"), moves, strict=True)
-                )
-                new = _with(better, position, start, stop, bench, noise)
-                if new.statistic < better.statistic:
-                    better = new
-        if better is fit:
-            step = float(step // 2) if step > 1.0 else step / 2.0
-        fit = better
+def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, reach: float, step: float) -> Fit:
+    """A fit with the edges of a push moved by whole steps to where they fit best, within reach or beyond it [samples].
+
+    Every pair of edges is compared with the rest of the model free; only the best is fitted.
+    """
+    interval = bench.data.period / bench.data.samples
+    moves: FloatArray = interval * step * np.arange(-round(reach / step), round(reach / step) + 1.0)
+    for _ in range(MOST_MOVES):
+        push = fit.effects[position]
+        firsts, lasts = (float(getattr(push, name)) + moves for name in ("start", "stop"))
+        start, stop, at_an_end = _best_edges(bench, fit, noise, position, firsts, lasts)
+        new = _with(fit, position, start, stop, bench, noise)
+        if new.statistic >= fit.statistic:
+            break
+        fit = new
+        if not at_an_end:
+            break
     return fit
 
 
@@ -121,31 +119,97 @@ def _with(fit: Fit, position: int, start: float, stop: float, bench: Bench, nois
 
 
 def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, stride: int) -> tuple[float, float]:
-    """Begin and end [s] of the push that would bring the statistic down most, the rest of the model free.
+    """Begin and end [s] of the push that would bring the statistic down most, the rest of the model free."""
+    samples, period = bench.data.samples, bench.data.period
+    # each sample stands for half an interval to either side
+    edges = (np.arange(stride, samples + 1.0, stride) - 0.5) * (period / samples)
+    others = [e for k, e in enumerate(fit.effects) if k != position]
+    without = bench.fit(others, noise, start=fit.parameters)
+    rest = _Rest(fit.effects[position], others, without.scale, without.off(without.whitened), without.off)
+    instants, gains = _windows(bench, rest, noise, edges, kept=True)
+    i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
+    first, last = float(instants[i]), float(instants[j])
+    return float(np.mod(first, period)), float(np.mod(last, period))
+
+
+def _best_edges(
+    bench: Bench, fit: Fit, noise: NoiseFloor, position: int, firsts: FloatArray, lasts: FloatArray
+) -> tuple[float, float, bool]:
+    """The best of some begins and ends [s] of a push, and whether one of them is the first or the last of its kind.
+
+    Compared beside the rest of the model as it is with the push: without it that may bend far.
+    """
+    counts = bench.counts(fit.effects)
+    own = fit.slice_of(position, counts)
+    rest_columns = np.delete(fit.flat[:, : len(fit.values)], np.arange(own.start, own.stop), axis=1)
+    basis = span(rest_columns)
+
+    def across(columns: FloatArray) -> FloatArray:
+        return off(basis, off(fit.free, columns))
+
+    left = across(fit.whitened + fit.flat[:, own] @ fit.values[own])
+    others = [e for k, e in enumerate(fit.effects) if k != position]
+    rest = _Rest(fit.effects[position], others, fit.scale, left, across)
+    period, half = bench.data.period, 0.5 * bench.data.period / bench.data.samples
+    times = [np.mod(each + half, period) - half for each in (firsts, lasts)]
+    instants, gains = _windows(bench, rest, noise, np.unique(np.concatenate(times)))
+    i, j = (np.argmin(np.abs(instants[:, None] - each), axis=0) for each in times)
+    wanted = np.where(i[:, None] == j, -np.inf, gains[i[:, None], j])
+    a, b = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
+    at_an_end = a in (0, len(firsts) - 1) or b in (0, len(lasts) - 1)
+    return float(np.mod(firsts[a], period)), float(np.mod(lasts[b], period)), bool(at_an_end)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """A model without its push.
+
+    Attributes:
+        push: the push, whose edges are to be found.
+        effects: the model.
+        scale: (E,) factor of the residual of each equation.
+        left: (M,) whitened residual without the push, across all that is free.
+        across: whitened columns (M, k) without what the model could take up of them.
+    """
+
+    push: Effect
+    effects: list[Effect]
+    scale: FloatArray
+    left: FloatArray
+    across: Callable[[FloatArray], FloatArray]
+
+
+def _windows(
+    bench: Bench, rest: _Rest, noise: NoiseFloor, instants: FloatArray, *, kept: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Instants (T,) [s] and drop of the statistic (T, T) by the push from one to another, the rest of the model free.
 
     A push during any window is the difference of two that begin with the period.
+
+    Args:
+        bench: the recording.
+        rest: the model without the push.
+        noise: noise floor.
+        instants: (t,) between half a sample before the first and half a sample before the end of the period, in order
+            [s]; the begin and the end of the period are added.
+        kept: whether these instants will be asked for again.
     """
-    push, period, samples = fit.effects[position], bench.data.period, bench.data.samples
-    interval = period / samples
-    others = [e for k, e in enumerate(fit.effects) if k != position]
-    rest = bench.fit(others, noise, start=fit.parameters)
-    left = rest.off(rest.whitened)
-    ends = np.arange(stride, samples + 1, stride)
-    # each sample stands for half an interval to either side; a push of a whole period would be none
-    stops = [(float(end) - 0.5) * interval - NEARLY * period for end in ends]
-    begun = [replace(push, start=-0.5 * interval, stop=stop, period=period) for stop in stops]  # type: ignore[call-arg]
-    touched, spectra = bench.variant_spectra(begun, others)
+    period = bench.data.period
+    begin = -0.5 * period / bench.data.samples
+    instants = instants[(instants > begin + NEARLY * period) & (instants < begin + (1.0 - NEARLY) * period)]
+    instants = np.concatenate([[begin], instants, [begin + period]])
+    # a push of a whole period would be none
+    stops = [float(instant) - NEARLY * period for instant in instants[1:]]
+    begun = [replace(rest.push, start=begin, stop=stop, period=period) for stop in stops]  # type: ignore[call-arg]
+    touched, spectra = (bench.variant_spectra if kept else bench.spectra_of_variants)(begun, rest.effects)
     harmonics, equations, count, width = spectra.shape
     whole = np.zeros((harmonics, len(rest.scale), count * width), dtype=np.complex128)
     whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
     scaled = np.asarray(whole * rest.scale[:, None], dtype=np.complex128)
-    columns = rest.off(whiten(bench.whitener(noise), scaled)).reshape(-1, count, width)
+    columns = rest.across(whiten(bench.whitener(noise), scaled)).reshape(-1, count, width)
     # nothing pushes before the first instant
     columns = np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
-    gains = _window_gains(columns, left)
-    i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
-    first, last = ((float(int(k) * stride) - 0.5) * interval for k in (i, j))
-    return float(np.mod(first, period)), float(np.mod(last, period))
+    return instants, _window_gains(columns, rest.left)
 
 
 def _window_gains(columns: FloatArray, left: FloatArray) -> FloatArray:
