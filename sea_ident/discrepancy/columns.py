@@ -6,13 +6,16 @@ import numpy as np
 
 from sea_ident._typing import IntArray
 from sea_ident.discrepancy.data import PeriodData, equation_row, spectrum
-from sea_ident.discrepancy.free_shapes import signal_effects
+from sea_ident.discrepancy.free_shapes import seen_by, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Anchor, Column, Contribution, Effect, State, corrected_motion
 
 VARIANTS_KEPT = 3e8
 """Bytes of columns of candidates that are kept for the next search."""
 
+
+STATES_KEPT = 24
+"""Motions, each corrected by other effects in the chain of signals, that are kept."""
 
 Key = tuple[str, str | None, str]
 """Name of an effect, its joint, and the other joint where there is one."""
@@ -40,7 +43,7 @@ class Columns:
         """Robot and mean motion, with the errors of the sensors taken out that the effects describe."""
         signals = signal_effects(effects)
         if signals not in self._states:
-            if len(self._states) > 12:
+            if len(self._states) > STATES_KEPT:
                 self._states.pop(next(k for k in self._states if k))
             motion = corrected_motion(self.robot, signals, self.data.motion)
             self._states[signals] = State(self.robot, motion, self.data.channels)
@@ -52,6 +55,7 @@ class Columns:
 
     def columns_behind(self, effect: Effect, signals: tuple[Effect, ...]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect behind the effects in the chain of signals of its model."""
+        signals = seen_by(effect, signals)
         key = (effect, signals)
         if key not in self._columns:
             if len(self._columns) > 400:
@@ -69,12 +73,12 @@ class Columns:
         Returns:
             (e,) equations that it touches, and (H + 1, e, v, k) columns in these.
         """
-        signals = signal_effects(effects)
+        signals = seen_by(variants[0], signal_effects(effects))
         key = (tuple(variants), signals)
         if key not in self._variants:
             if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
                 self._variants.clear()
-            self._variants[key] = self.spectra_of_variants(variants, effects)
+            self._variants[key] = self.spectra_of_variants(variants, signals)
             self._places[effect_key(variants[0])] = self._variants[key][0]
         return self._variants[key]
 
@@ -82,8 +86,9 @@ class Columns:
         self, variants: Sequence[Effect], effects: Sequence[Effect]
     ) -> tuple[IntArray, ComplexArray]:
         """The same, of shapes that nobody will ask for again."""
-        state = self.state(effects)
-        return self._touched([variant.evaluate(state) for variant in variants], signal_effects(effects))
+        signals = seen_by(variants[0], signal_effects(effects))
+        state = self.state(signals)
+        return self._touched([variant.evaluate(state) for variant in variants], signals)
 
     def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
         """Equations with anything in them, and the spectra (H + 1, e, v, ...) of all parts there."""

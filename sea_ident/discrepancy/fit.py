@@ -1,6 +1,6 @@
 """A model fitted to a recording."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,8 +24,8 @@ class Fit:
         scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
         free: (M, m) orthonormal basis of the samples that are left out.
-        flat: (M, p + s) whitened `directions`, without the samples that are left out.
-        directions: (H + 1, E, p + s) scaled torque by columns, and tangents of the shapes.
+        linear: gives `flat` and `directions` to those that ask: most fits are trials of which nothing but the statistic
+            is wanted.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
         frame: (p, r) what makes `flat` nearly orthonormal, where no shape is free and it is known.
     """
@@ -37,8 +37,7 @@ class Fit:
     scale: FloatArray
     whitened: FloatArray
     free: FloatArray
-    flat: FloatArray
-    directions: ComplexArray
+    linear: Callable[[], tuple[FloatArray, ComplexArray]]
     free_shapes: tuple[tuple[int, Shape], ...]
     frame: FloatArray | None = None
 
@@ -46,6 +45,20 @@ class Fit:
     def statistic(self) -> float:
         """Weighted sum of squared residuals."""
         return float(self.whitened @ self.whitened)
+
+    @cached_property
+    def _linear(self) -> tuple[FloatArray, ComplexArray]:
+        return self.linear()
+
+    @property
+    def flat(self) -> FloatArray:
+        """(M, p + s) whitened `directions`, without the samples that are left out."""
+        return self._linear[0]
+
+    @property
+    def directions(self) -> ComplexArray:
+        """(H + 1, E, p + s) scaled torque by columns, and tangents of the shapes."""
+        return self._linear[1]
 
     @property
     def basis(self) -> FloatArray:
@@ -59,7 +72,6 @@ class Fit:
 
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray]:
-        # only for those that ask: most fits are trials of which nothing but the statistic is wanted
         return solve(self.flat, self.whitened)[1:] if self.frame is None else solve_near(self.frame, self.flat)
 
     @property

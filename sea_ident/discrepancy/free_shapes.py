@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from sea_ident.effects import Effect, Shape
+from sea_ident.effects import Effect, JointEffect, Shape
 from sea_ident.effects.signal import SignalEffect
 
 SHAPES_THAT_STAY = {
@@ -30,6 +30,13 @@ def _is_signal_kind(kind: type[Effect]) -> bool:
 def signal_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Those effects that sit in the chain of signals."""
     return tuple(effect for effect in effects if is_signal(effect))
+
+
+def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Those effects in the chain of signals that change the columns of an effect: what is of one joint sees its own."""
+    if not isinstance(effect, JointEffect):
+        return signals
+    return tuple(signal for signal in signals if signal.joint is None or signal.joint == effect.joint)
 
 
 def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes
@@ -66,7 +66,7 @@ class ParameterFits(Tangents):
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
         empty = np.zeros((len(flat), 0))
-        return Fit(effects, columns, values, residual, scale, flat, empty, empty, nothing, ())
+        return Fit(effects, columns, values, residual, scale, flat, empty, lambda: (empty, nothing), ())
 
     def fit(
         self,
@@ -117,20 +117,23 @@ class ParameterFits(Tangents):
         factors = whitening.factors(scale)
         whitened = factors @ left
         residual = target - design @ values
-        if noise is None:
-            directions, spectra = parts.scaled(factors), design
-        else:
-            directions = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
-            spectra = self.scaled(design, slopes, residual, scale, slopes @ values + beside)
         shapes = free_shapes(effects) if tangents else ()
-        if shapes:
-            tangent = self.tangents(effects, columns, values, shapes)
-            bent = self.scaled(*tangent, residual, scale, slopes @ values + beside)
-            directions = np.concatenate([directions, whitening.flat(bent)], axis=1)
-            spectra = np.concatenate([spectra, bent], axis=2)
-            frame = None
-        free = whitening.free
-        return Fit(effects, columns, values, residual, scale, whitened, free, directions, spectra, shapes, frame)
+        stiffness = slopes @ values + beside
+
+        def linear() -> tuple[FloatArray, ComplexArray]:
+            if noise is None:
+                flat, spectra = parts.scaled(factors), design
+            else:
+                flat = self._flat_columns(parts, left, whitening.parts, slopes, scale, factors, stiffness)
+                spectra = self.scaled(design, slopes, residual, scale, stiffness)
+            if shapes:
+                bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, stiffness)
+                flat = np.concatenate([flat, whitening.flat(bent)], axis=1)
+                spectra = np.concatenate([spectra, bent], axis=2)
+            return flat, spectra
+
+        frame = None if shapes else frame
+        return Fit(effects, columns, values, residual, scale, whitened, whitening.free, linear, shapes, frame)
 
     def _descend(
         self,
@@ -162,7 +165,8 @@ class ParameterFits(Tangents):
             cost, best = new_cost, values
             if converged:
                 break
-            flat = self._flat_columns(parts, left, whitening, slopes, scale, slopes @ values + beside)
+            factors = whitening.factors(scale)
+            flat = self._flat_columns(parts, left, whitening.parts, slopes, scale, factors, slopes @ values + beside)
             if frame is None:
                 step, frame = least_squares(flat, whitened)
             else:
@@ -205,16 +209,17 @@ class ParameterFits(Tangents):
         self,
         parts: Parts,
         left: FloatArray,
-        whitening: Whitening,
+        part_of: IntArray,
         slopes: FloatArray,
         scale: FloatArray,
+        factors: FloatArray,
         stiffness: FloatArray,
     ) -> FloatArray:
         """(M, p) whitened decrease of the scaled residual with every parameter: `scaled`, in parts."""
-        out = parts.scaled(whitening.factors(scale))
+        out = parts.scaled(factors)
         for e in self._scaled_links(stiffness):
             for k in np.flatnonzero(slopes[e]):
-                out[:, k] += scale[e] * slopes[e, k] / stiffness[e] * left[whitening.parts[e]]
+                out[:, k] += scale[e] * slopes[e, k] / stiffness[e] * left[part_of[e]]
         return out
 
     def scaled(

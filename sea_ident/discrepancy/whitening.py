@@ -12,7 +12,7 @@ import numpy as np
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.columns import Columns
 from sea_ident.discrepancy.data import EquationKind
-from sea_ident.discrepancy.free_shapes import signal_effects
+from sea_ident.discrepancy.free_shapes import seen_by, signal_effects
 from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Effect
@@ -101,19 +101,20 @@ class Whitening:
     def design(self, effects: Sequence[Effect]) -> Parts:
         """Columns of a model in parts."""
         signals = signal_effects(effects)
-        missing = [effect for effect in effects if (effect, signals) not in self._kept]
+        seen = {effect: seen_by(effect, signals) for effect in effects}
+        missing = [effect for effect in effects if (effect, seen[effect]) not in self._kept]
         if missing and self._bytes > PARTS_KEPT:
             self._kept.clear()
             self._bytes, missing = 0, list(effects)
         # together, for what is done to one column costs little more for many
-        found = self._in_parts([self._columns.columns_behind(effect, signals) for effect in missing])
+        found = self._in_parts([self._columns.columns_behind(effect, seen[effect]) for effect in missing])
         for effect, parts in zip(missing, found, strict=True):
-            self._kept[effect, signals] = parts
+            self._kept[effect, seen[effect]] = parts
             self._bytes += sum(block.rows.nbytes for block in parts.blocks)
         blocks: list[Block] = []
         width = 0
         for effect in effects:
-            parts = self._kept[effect, signals]
+            parts = self._kept[effect, seen[effect]]
             blocks.extend(replace(block, first=block.first + width) for block in parts.blocks)
             width += parts.shape[2]
         return Parts((self._count, len(self.free), width), tuple(blocks))
