@@ -1,12 +1,13 @@
 """Columns of effects as spectra."""
 
 import numpy as np
+import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import without_digits
-from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.data import equation_row, period_data, spectrum, wide_processing
 from sea_ident.discrepancy.settle import settle
-from sea_ident.effects import base_effects, spring_effects
+from sea_ident.effects import State, base_effects, corrected_motion, make_effect, spring_effects
 from sea_ident.regressor import prior_parameters
 from sea_ident.robot import load_robot
 
@@ -34,3 +35,23 @@ def test_parameters_that_only_digits_would_show_stay_as_described(laboratory, tm
     assert len(inertial) == 10 * len(nearly.body_indices)
     assert np.max(np.abs(fit.values[inertial] - described[inertial])) < 5.0
     assert fit.statistic < 1.3 * fit.dof
+
+
+@pytest.mark.parametrize("name", ["viscous_friction", "torque_ripple", "spring_stiffness", "rigid_bodies"])
+def test_columns_see_every_signal_that_concerns_them(nothing_missing, name):
+    """What is kept for an effect beside errors of sensors is what it is on the motion without any of them."""
+    bench = nothing_missing[0]
+    delays = [make_effect("position_delay", joint, delay=0.004) for joint in ("hip", "knee")]
+    delays.append(make_effect("torque_delay", "hip", delay=0.003))
+    library = {(e.name, e.joint): e for e in bench.effects}
+    library["torque_ripple", "hip"] = make_effect("torque_ripple", "hip", order=8.0)
+    effect = next(e for (kind, joint), e in library.items() if kind == name and joint in ("hip", None))
+    for signals in [(), (delays[0],), (delays[1],), (delays[0], delays[1]), tuple(delays)]:
+        part = effect.evaluate(State(bench.robot, corrected_motion(bench.robot, signals, bench.data.motion)))
+        for signal in signals:
+            part = signal.shifted(bench.robot, bench.data.motion.time, part)
+        rows = np.stack([equation_row(equation, part) for equation in bench.data.equations], axis=1)
+        expected = without_digits(spectrum(rows, bench.data.harmonics))
+        np.testing.assert_allclose(bench.columns_behind(effect, signals), expected, atol=1e-12)
+        alone = bench.variant_spectra((effect,), (*bench.effects, *signals))
+        np.testing.assert_allclose(alone[1][:, :, 0], expected[:, alone[0]], atol=1e-12)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.candidates import effect_key, scan
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.confirm import confirm
 from sea_ident.discrepancy.data import BARELY_SEEN, around_reversals, away_from_reversals
 from sea_ident.discrepancy.search import Selection, without

@@ -3,7 +3,8 @@
 import pytest
 
 import sea_ident.discrepancy.exchange as module
-from sea_ident.discrepancy.candidates import effect_key, scan
+from sea_ident.discrepancy.candidates import scan, sought
+from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.exchange import Outdone, exchange
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import settle_again
@@ -65,3 +66,26 @@ def test_a_model_that_is_right_is_left_alone(rippled, tries):
     bench, _, right = rippled
     assert exchange(bench, right, 1, {}) is right
     assert tries == []
+
+
+def test_only_what_acts_where_the_effect_did_is_compared_in_its_place(wrong):
+    bench, now = wrong
+    noise, fit = now.noise, now.fit
+    reduced = bench.fit(fit.effects[:-1], noise, start=fit.parameters)
+    everything = {c.key: c.gain for c in scan(bench, reduced, noise)}
+    some = {c.key: c.gain for c in scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))}
+    assert all(gain == pytest.approx(everything[which], rel=1e-6, abs=1e-6) for which, gain in some.items())
+    # friction of the ankle does not explain what friction of the hip does
+    assert key("torque_ripple") in some
+    assert key("torque_ripple", "ankle") in everything
+    assert key("torque_ripple", "ankle") not in some
+
+
+def test_whatever_explains_a_part_of_what_the_right_effect_does_is_compared(rippled):
+    bench, _, right = rippled
+    reduced = bench.fit(right.fit.effects[:-1], right.noise, start=right.fit.parameters)
+    explained = reduced.statistic - right.fit.statistic
+    most = {c.key for c in scan(bench, reduced, right.noise) if c.gain > 0.1 * explained}
+    some = {c.key for c in scan(bench, reduced, right.noise, instead_of=sought(reduced, right.fit, right.noise))}
+    assert len(most) > 1
+    assert most <= some

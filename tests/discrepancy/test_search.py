@@ -10,7 +10,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.search import BESIDE_ANOTHER, _acceptable, search, visible_changes
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import make_effect
 
 
@@ -49,6 +49,24 @@ def test_the_small_one_would_not_count_at_the_joint_of_the_large_one(unequal):
         )
     assert np.max(changes["hip"]) < BESIDE_ANOTHER * np.max(changes["knee"])
     assert np.any(changes["hip"] > BESIDE_ANOTHER * changes["knee"])
+
+
+def test_what_was_found_stands_still(unequal):
+    bench, found = unequal
+    again = settle_again(bench, found.final.fit)
+    assert again.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
+
+
+def test_a_search_that_goes_on_from_another_keeps_what_is_needed_and_no_more(unequal):
+    """Begun with what was found and a push that a drift, known by now, had looked like."""
+    bench, found = unequal
+    push = make_effect("external_force", "knee", start=1.0, stop=1.5, period=bench.data.period)
+    model = (*found.final.fit.effects, push)
+    final = settle_again(bench, bench.fit(model, found.final.noise, start=found.final.fit.parameters))
+    begun = replace(found, final=final, added=found.added + 1, p_values=(*found.p_values, 1e-9))
+    assert named(search(bench, bench.effects, begun)) == named(found)
+    alone = replace(begun, final=settle_again(bench, bench.fit((*bench.effects, push), final.noise)), added=1)
+    assert named(search(bench, bench.effects, replace(alone, p_values=(1e-9,)))) == named(found)
 
 
 def test_when_a_push_begins_and_ends_is_paid_for(nothing_missing):
