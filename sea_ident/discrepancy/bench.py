@@ -10,7 +10,14 @@ from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import off, span
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, noise_beside_model, noise_from_steps
+from sea_ident.discrepancy.noise import (
+    ComplexArray,
+    NoiseFloor,
+    closed_freedom_of_many,
+    noise_beside_model,
+    noise_from_steps,
+    step_freedom,
+)
 from sea_ident.discrepancy.parameter_fits import ParameterFits
 from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.whitening import Whitening
@@ -145,18 +152,20 @@ class Bench(ParameterFits):
 
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor of the mean with the parameters of a fit."""
-        return self._noise(fit, self.period_steps(fit), self.data.averaged)
+        steps = self.period_steps(fit)
+        return self._noise(fit, steps, self.data.averaged, closed_freedom_of_many(len(steps)))
 
     def noise_of_cut(self, fit: Fit) -> NoiseFloor:
         """The same by periods as they are cut, which do not close: to compare these with one another."""
-        return self._noise(fit, np.diff(self.period_residuals(fit), axis=0) / np.sqrt(2.0), self.data.periods)
+        steps = np.diff(self.period_residuals(fit), axis=0) / np.sqrt(2.0)
+        return self._noise(fit, steps, self.data.periods, step_freedom(self.data.periods))
 
-    def _noise(self, fit: Fit, steps: ComplexArray, periods: float) -> NoiseFloor:
-        noise = noise_from_steps(steps, periods)
+    def _noise(self, fit: Fit, steps: ComplexArray, periods: float, each: float) -> NoiseFloor:
+        noise = noise_from_steps(steps, periods, each)
         for _ in range(NOISE_ROUNDS):
             whitening = Whitening(self, noise.whitener(), self._free)
             taken = span(whitening.flat(fit.directions))
-            noise = noise_beside_model(steps, noise, np.concatenate([whitening.free, taken], axis=1))
+            noise = noise_beside_model(steps, noise, each, np.concatenate([whitening.free, taken], axis=1))
         return noise
 
     @cached_property

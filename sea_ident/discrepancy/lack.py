@@ -6,7 +6,7 @@ from scipy import stats
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.gap import excess_power
 from sea_ident.discrepancy.judge import flat_steps
-from sea_ident.discrepancy.noise import closed_directions, closed_freedom
+from sea_ident.discrepancy.noise import closed_directions, closed_freedom_of_many
 from sea_ident.discrepancy.settle import Settled
 
 LACK_LEVEL = 1e-3
@@ -32,8 +32,9 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
         return statistic, 0, 1.0
     steps, basis = flat_steps(bench, settled), settled.fit.basis
     steps = steps - (steps @ basis) @ basis.T  # the samples that are left out are out of them already
-    directions = min(closed_directions(steps), float(dof))
-    freedom = directions * closed_freedom(len(steps))
+    # a floor that is an estimate of its own for every few harmonics spreads the statistic as fewer directions would
+    directions = min(closed_directions(steps), float(dof)) * settled.noise.certainty
+    freedom = directions * closed_freedom_of_many(len(steps))
     return statistic, dof, float(stats.f.sf(statistic / max(dof, 1), directions, freedom))
 
 

@@ -9,7 +9,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import EquationKind, waveform
 from sea_ident.discrepancy.findings import Location
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.noise import NoiseFloor, closed_directions, closed_freedom, stacked, unstacked
+from sea_ident.discrepancy.noise import NoiseFloor, closed_directions, closed_freedom_of_many, stacked, unstacked
 
 SIGNIFICANT = 5.0
 """Locations below this z-score are not told."""
@@ -44,7 +44,7 @@ def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
             z = (power / variance - 1.0) * np.sqrt(share * count / 2.0)
             # of few directions the energy has a long tail: as rare as the z-score would be of many
             directions = min(share, _filled(own, count)) * count
-            chance = stats.f.sf(power / variance, directions, directions * closed_freedom(len(own)))
+            chance = stats.f.sf(power / variance, directions, directions * closed_freedom_of_many(len(own)))
             if z > SIGNIFICANT and chance < stats.norm.sf(SIGNIFICANT):
                 label = _label(bench, residual, e, part)
                 found.append(Location(equation.joint, label, regime, float(np.sqrt(power - variance)), float(z)))

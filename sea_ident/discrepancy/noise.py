@@ -1,5 +1,6 @@
 """The noise floor, from the periods of the recording itself."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,13 @@ from sea_ident._typing import FloatArray
 ComplexArray = NDArray[np.complex128]
 
 SMALLEST_HALF_WIDTH = 4
-"""Noise is smoothed over at least this many harmonics to either side."""
+"""Noise is smoothed over at least this many harmonics to either side, ..."""
+
+FREEDOM_PER_EQUATION = 6.0
+"""... and over as many as give this many degrees of freedom per equation [-]."""
+
+WIDER = 2
+"""How many times as many harmonics the floor is smoothed over that the next one is levelled by."""
 
 FEWEST_PAIRS = 4
 """Pairs of steps without a common period from which on the spread of their energy is estimated: six periods, ..."""
@@ -25,7 +32,10 @@ FEWEST_CLOSED_STEPS = 5
 """Steps between periods from which on they surely close."""
 
 CLOSED_CORRELATION = (-0.317, -0.183)
-"""Correlation of such a step with the next and with the one after it, the mean over a period."""
+"""Correlation of such a step with the next and with the one after it, the mean over a period ..."""
+
+CLOSED_CORRELATION_SQUARED = (0.132, 0.065)
+"""... and the mean of its square: where along a period noise is, is all the same to what is said of many directions."""
 
 FEWEST_CLOSED_PAIRS = 15
 """The same of steps between periods that close: ten periods, ..."""
@@ -66,15 +76,45 @@ class NoiseFloor:
         weight[0] = 1.0
         return np.asarray(np.sqrt(weight @ power), dtype=np.float64)
 
+    @property
+    def certainty(self) -> float:
+        """What the inverse of an estimated covariance is to be multiplied by to be right on the mean [-].
+
+        And what the variance of a sum of squares that was whitened by it is to be divided by (Hotelling).
+        """
+        return max(self.freedom - self.equations, 1.0) / self.freedom
+
     def whitener(self) -> ComplexArray:
         """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
         count = self.equations
         size = np.sqrt(np.maximum(np.real(np.einsum("kee->ke", self.covariance)), 1e-300))
         correlation = self.covariance / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(count)
         triangle = np.linalg.cholesky(correlation)
-        unbiased = np.sqrt(max(self.freedom - count, 1.0) / self.freedom)
         inverse = np.linalg.solve(triangle, np.broadcast_to(np.eye(count, dtype=np.complex128), triangle.shape))
-        return np.asarray(unbiased * inverse / size[:, None, :], dtype=np.complex128)
+        return np.asarray(np.sqrt(self.certainty) * inverse / size[:, None, :], dtype=np.complex128)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What is left of noise where some of its directions are projected out.
+
+    Attributes:
+        colour: (H + 1, E, E) lower triangles that turn white noise into noise of this covariance.
+        kept: (H + 1, E) share of the white noise that is left.
+    """
+
+    colour: ComplexArray
+    kept: FloatArray
+
+    def made_whole(self, covariance: ComplexArray, half: int) -> ComplexArray:
+        """(H + 1, E, E) covariance of all the noise from that of what is left, a mean over 2 half + 1 harmonics."""
+        mean = _moving_mean(self.kept.astype(np.complex128), half).real
+        kept = np.maximum(self.kept + np.maximum(SMALLEST_REST - mean, 0.0), 0.0)
+        adjoint = self.colour.conj().transpose(0, 2, 1)
+        whole = np.linalg.cholesky(_moving_mean(np.matmul(self.colour, adjoint), half))
+        left = np.linalg.cholesky(_moving_mean(np.matmul(self.colour * kept[:, None, :], adjoint), half))
+        grown = np.matmul(whole, np.linalg.inv(left))
+        return np.asarray(np.matmul(np.matmul(grown, covariance), grown.conj().transpose(0, 2, 1)))
 
 
 def stacked(values: ComplexArray) -> FloatArray:
@@ -83,7 +123,7 @@ def stacked(values: ComplexArray) -> FloatArray:
     return np.concatenate([values[0].real, rest.real, rest.imag])
 
 
-def noise_from_steps(steps: ComplexArray, periods: float, leverage: FloatArray | None = None) -> NoiseFloor:
+def noise_from_steps(steps: ComplexArray, periods: float, each: float, rest: Rest | None = None) -> NoiseFloor:
     """Covariance of the mean residual from successive differences of the periods.
 
     Differences, and not distances from the mean, so that a drift over the recording does not count as noise.
@@ -91,7 +131,8 @@ def noise_from_steps(steps: ComplexArray, periods: float, leverage: FloatArray |
     Args:
         steps: (S, H + 1, E) differences of the residuals of successive periods over the root of two.
         periods: number of periods that the mean is of.
-        leverage: (H + 1, E) share of the residuals that was projected out of them; none by default.
+        each: degrees of freedom of a variance from these steps: `step_freedom` or `closed_freedom_of_many`.
+        rest: what of the noise is in the steps; all by default.
 
     Returns:
         The noise floor.
@@ -100,16 +141,12 @@ def noise_from_steps(steps: ComplexArray, periods: float, leverage: FloatArray |
     products = np.einsum("pke,pkf->kef", steps, steps.conj()) / max(number, 1)
     products[1:] /= 2.0
     products[0] = products[0].real
-    # variance of a mean of squared successive differences, as degrees of freedom
-    each = step_freedom(number + 1)
-    half = max(SMALLEST_HALF_WIDTH, int(np.ceil((6.0 * count / each - 1.0) / 2.0)))
-    half = min(half, max((harmonics - 1) // 2, 1))
+    half = _half_width(harmonics, count, each)
     smooth = _moving_mean(products, half)
     left = 1.0
-    if leverage is not None:
-        kept = np.sqrt(np.maximum(1.0 - _moving_mean(leverage.astype(np.complex128), half).real, SMALLEST_REST))
-        smooth = smooth / (kept[:, :, None] * kept[:, None, :])
-        left = float(np.mean(kept**2))
+    if rest is not None:
+        smooth = rest.made_whole(smooth, half)
+        left = max(float(np.mean(rest.kept)), SMALLEST_REST)
     # a constant that wanders more than its neighbours has a floor of its own
     ratio = np.real(np.einsum("ee->e", products[0])) / np.real(np.einsum("ee->e", smooth[0]))
     inflate = np.sqrt(np.where(ratio > 4.0, ratio, 1.0))
@@ -130,13 +167,25 @@ def step_freedom(periods: int) -> float:
 
 
 def closed_freedom(number: int) -> float:
-    """Degrees of freedom of a variance from the mean square of this many steps between periods that close.
+    """Degrees of freedom of a variance along one direction from this many steps between periods that close.
 
     Such a step is related less to the next than one between periods as they are cut, but to the one after it too.
     """
+    return _freedom(number, [c**2 for c in CLOSED_CORRELATION])
+
+
+def closed_freedom_of_many(number: int) -> float:
+    """The same of every variance where many directions are averaged over, each with a phase of the period of its own.
+
+    Where along a period noise gathers, steps are related more closely than on the mean over the period.
+    """
+    return _freedom(number, CLOSED_CORRELATION_SQUARED)
+
+
+def _freedom(number: int, squared: Sequence[float]) -> float:
     if number < FEWEST_CLOSED_STEPS:
         return step_freedom(number + 1)
-    related = sum((number - k) * c**2 for k, c in enumerate(CLOSED_CORRELATION, start=1))
+    related = sum((number - k) * square for k, square in enumerate(squared, start=1))
     return number**2 / (number + 2.0 * related)
 
 
@@ -175,7 +224,7 @@ def unstacked(values: FloatArray, equations: int) -> ComplexArray:
     return np.concatenate([first[None].astype(np.complex128), (real + 1j * imaginary).reshape(shape)])
 
 
-def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, basis: FloatArray) -> NoiseFloor:
+def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, each: float, basis: FloatArray) -> NoiseFloor:
     """Noise floor of what a fit leaves: the part of the scatter that it takes up is not in it.
 
     Friction that differs from pass to pass gathers around reversals. Samples left out and columns of friction take
@@ -184,6 +233,7 @@ def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, basis: FloatArray
     Args:
         steps: (S, H + 1, E) differences of the residuals of successive periods over the root of two.
         plain: noise floor of the residuals as they are.
+        each: degrees of freedom of a variance from these steps.
         basis: (M, r) orthonormal basis of everything that is free, whitened by `plain`.
 
     Returns:
@@ -195,10 +245,25 @@ def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, basis: FloatArray
     share = unstacked(np.sum(basis**2, axis=1), count)
     leverage = share.real.copy()
     leverage[1:] = (share[1:].real + share[1:].imag) / 2.0
-    inside = noise_from_steps(np.stack([unstacked(f, count) for f in flat]), plain.periods, leverage)
     colour = np.linalg.inv(whitener)
-    covariance = np.matmul(np.matmul(colour, inside.covariance), colour.conj().transpose(0, 2, 1))
+    size = np.linalg.norm(colour, axis=2)
+    # levelled by a floor that is smoothed more than the new one: one as rough as that follows the very steps, and what
+    # is smoothed beside it comes out with about half the degrees of freedom
+    own = colour / size[:, :, None]
+    wide = min(WIDER * _half_width(len(own), count, each), max((len(own) - 1) // 2, 1))
+    typical = np.linalg.cholesky(_moving_mean(np.matmul(own, own.conj().transpose(0, 2, 1)), wide))
+    rest = Rest(np.asarray(np.linalg.solve(typical, own), dtype=np.complex128), 1.0 - leverage)
+    level = np.stack([np.matmul(rest.colour, unstacked(f, count)[:, :, None])[:, :, 0] for f in flat])
+    inside = noise_from_steps(level, plain.periods, each, rest)
+    back = typical * size[:, :, None]
+    covariance = np.matmul(np.matmul(back, inside.covariance), back.conj().transpose(0, 2, 1))
     return replace(inside, covariance=covariance)
+
+
+def _half_width(harmonics: int, count: int, each: float) -> int:
+    """Harmonics to either side that a floor of this many equations is smoothed over."""
+    half = max(SMALLEST_HALF_WIDTH, int(np.ceil((FREEDOM_PER_EQUATION * count / each - 1.0) / 2.0)))
+    return min(half, max((harmonics - 1) // 2, 1))
 
 
 def _moving_mean(values: ComplexArray, half: int) -> ComplexArray:

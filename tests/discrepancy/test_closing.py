@@ -5,7 +5,7 @@ import pytest
 
 from sea_ident.discrepancy.closing import closing_weights, mean_of_periods, successive
 from sea_ident.discrepancy.data import spectrum
-from sea_ident.discrepancy.noise import closed_freedom
+from sea_ident.discrepancy.noise import closed_freedom, closed_freedom_of_many
 from sea_ident.motion import Motion
 
 SAMPLES = 400
@@ -70,6 +70,16 @@ def test_degrees_of_freedom_of_steps_that_close(number):
     along = successive(values, range(number + 2)).sum(axis=0)
     estimate = np.mean(along**2, axis=0)
     assert closed_freedom(number) == pytest.approx(2.0 * np.mean(estimate) ** 2 / np.var(estimate), rel=0.1)
+
+
+@pytest.mark.parametrize("number", [5, 8, 20])
+def test_degrees_of_freedom_of_steps_that_close_over_many_directions(number):
+    """The same of the mean over all samples of a period: each has a phase of its own."""
+    draws, samples = 3000, 50
+    values = np.random.default_rng(9).standard_normal((samples, number + 2, draws))
+    estimate = np.mean(successive(values, range(number + 2)) ** 2, axis=(0, 1))
+    found = 2.0 * np.mean(estimate) ** 2 / np.var(estimate) / samples
+    assert closed_freedom_of_many(number) == pytest.approx(found, rel=0.1)
 
 
 def test_noise_that_is_differentiated_does_not_leak_into_low_harmonics():

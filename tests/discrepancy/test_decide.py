@@ -91,7 +91,7 @@ def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_tur
     other = Bench(laboratory.data(laboratory.record(planted, periods=8, seed=9, motion=1)), bench.effects)
     start = settle(bench, bench.effects)
     found = {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
-    wrong = found["spring_hysteresis", JOINT], found["nonlinear_viscous_friction", "hip"]
+    wrong = found["asymmetric_spring", JOINT], found["nonlinear_viscous_friction", "hip"]
     right = found["spring_offset", JOINT], found["load_dependent_friction", "hip"]
 
     def fitted(*added):

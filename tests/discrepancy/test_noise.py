@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from sea_ident.discrepancy.closing import closing_weights, successive
+from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.lack import lack_of_fit
+from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import (
+    closed_freedom_of_many,
     noise_beside_model,
     noise_directions,
     noise_from_steps,
@@ -39,7 +43,7 @@ MIXING = np.array([[1.0, 0.0, 0.0], [0.8, 0.5, 0.0], [-0.02, 0.01, 0.03]])
 
 
 def test_covariance_of_the_mean():
-    found = noise_from_steps(steps_of(scatter(np.random.default_rng(1), 12, MIXING)), 12)
+    found = noise_from_steps(steps_of(scatter(np.random.default_rng(1), 12, MIXING)), 12, step_freedom(12))
     middle = np.mean(found.covariance[1:], axis=0)
     np.testing.assert_allclose(middle, MIXING @ MIXING.T / 12, atol=0.15 * np.linalg.norm(MIXING @ MIXING.T) / 12)
     # a real number for the constant, two for every harmonic
@@ -50,7 +54,7 @@ def test_covariance_of_the_mean():
 def test_a_drift_is_no_noise():
     quiet = scatter(np.random.default_rng(1), 12, MIXING)
     drift = 5.0 * np.linspace(-1.0, 1.0, 12)[:, None, None]
-    drifting, plain = (noise_from_steps(steps_of(each), 12) for each in (quiet + drift, quiet))
+    drifting, plain = (noise_from_steps(steps_of(each), 12, step_freedom(12)) for each in (quiet + drift, quiet))
     # around their mean the periods are spread by three
     assert np.all(drifting.std < 1.6 * plain.std[0] + plain.std)
     assert np.std(drift) > 3.0
@@ -61,9 +65,40 @@ def test_whitened_means_have_unit_variance(periods):
     rng, values = np.random.default_rng(2), []
     for _ in range(6):
         each = scatter(rng, periods, MIXING)
-        whitener = noise_from_steps(steps_of(each), periods).whitener()
+        whitener = noise_from_steps(steps_of(each), periods, step_freedom(periods)).whitener()
         values.append(stacked(np.matmul(whitener, each.mean(axis=0)[:, :, None])[:, :, 0]))
     assert np.mean(np.concatenate(values) ** 2) == pytest.approx(1.0, abs=0.12)
+
+
+@pytest.mark.parametrize("equations", [3, 6, 14])
+@pytest.mark.parametrize("periods", [8, 10, 20])
+def test_what_a_model_leaves_of_means_that_close_has_unit_variance(equations, periods):
+    """Many equations and few periods, noise that grows with the harmonics, a floor in two rounds beside a model."""
+    rng, harmonics, width, ratios = np.random.default_rng([equations, periods]), 80, 30, []
+    rise = 1.0 + (np.arange(harmonics + 1) / (0.3 * harmonics))[:, None, None] ** 2
+    mixing = rise * (np.eye(equations) + 0.5 * rng.standard_normal((equations, equations)) / np.sqrt(equations))
+    columns = rng.standard_normal((2, harmonics + 1, equations, width)) @ np.diag(np.linspace(0.1, 1.0, width))
+    columns = (columns[0] + 1j * columns[1]) / (1.0 + np.arange(harmonics + 1))[:, None, None]
+    columns[0] = columns[0].real
+    for _ in range(8):
+        values = rng.standard_normal((4 * harmonics, periods, equations))
+        weights = closing_weights(range(periods), len(values))
+        mean = _coloured(mixing, spectrum(np.einsum("tp,tpe->te", weights, values), harmonics))
+        steps = np.moveaxis(spectrum(successive(values, range(periods)), harmonics), 1, 0)
+        steps = np.stack([_coloured(mixing, step) for step in steps])
+        each = closed_freedom_of_many(len(steps))
+        noise = noise_from_steps(steps, 1.0 / np.mean(np.sum(weights**2, axis=1)), each)
+        for _ in range(2):
+            noise = noise_beside_model(steps, noise, each, np.linalg.qr(whiten(noise.whitener(), columns))[0])
+        basis = np.linalg.qr(whiten(noise.whitener(), columns))[0]
+        left = off(basis, whiten(noise.whitener(), mean))
+        ratios.append(left @ left / (len(left) - width))
+    # the mean of eight spreads by 0.025 of three equations, by less of more
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.06 if equations == 3 else 0.035)
+
+
+def _coloured(mixing, values):
+    return np.matmul(mixing, values[:, :, None])[:, :, 0]
 
 
 def test_stacked_real_numbers_go_back():
@@ -85,10 +120,10 @@ def test_a_model_that_takes_up_scatter_does_not_lower_the_floor_of_the_rest():
     """White scatter stays white however many of its directions a model takes: the rest is scaled up for them."""
     rng = np.random.default_rng(5)
     residuals = scatter(rng, 15, np.eye(3))
-    plain = noise_from_steps(steps_of(residuals), 15)
+    plain = noise_from_steps(steps_of(residuals), 15, step_freedom(15))
     size = len(stacked(residuals[0]))
     basis = np.linalg.qr(rng.standard_normal((size, size // 4)))[0]
-    beside = noise_beside_model(steps_of(residuals), plain, basis)
+    beside = noise_beside_model(steps_of(residuals), plain, step_freedom(15), basis)
     assert np.mean(beside.std / plain.std) == pytest.approx(1.0, abs=0.05)
     assert beside.total_freedom == pytest.approx(0.75 * plain.total_freedom, rel=0.05)
 
@@ -97,13 +132,13 @@ def test_what_the_model_takes_up_altogether_is_not_in_its_floor():
     """A few directions that differ wildly from period to period, all of them free in the model."""
     rng = np.random.default_rng(6)
     quiet = scatter(rng, 15, np.eye(3))
-    plain = noise_from_steps(steps_of(quiet), 15)
+    plain = noise_from_steps(steps_of(quiet), 15, step_freedom(15))
     wild = rng.standard_normal((len(stacked(quiet[0])), 4))
     loud = np.stack([unstacked(stacked(r) + 30.0 * wild @ rng.standard_normal(4), 3) for r in quiet])
-    loud_floor = noise_from_steps(steps_of(loud), 15)
+    loud_floor = noise_from_steps(steps_of(loud), 15, step_freedom(15))
     whitener = loud_floor.whitener()
     flat = np.stack([stacked(np.matmul(whitener, unstacked(w, 3)[:, :, None])[:, :, 0]) for w in wild.T], axis=1)
-    beside = noise_beside_model(steps_of(loud), loud_floor, np.linalg.qr(flat)[0])
+    beside = noise_beside_model(steps_of(loud), loud_floor, step_freedom(15), np.linalg.qr(flat)[0])
     assert np.all(loud_floor.std > 10.0 * plain.std)
     np.testing.assert_allclose(beside.std, plain.std, rtol=0.15)
 
