@@ -13,6 +13,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Shape
+from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
@@ -72,10 +73,33 @@ def refitted(
     if isinstance(effect, SpringEffect):
         # the law of the spring was another one as long as the effect was missing
         anchored = list(best.effects)
-        anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
+        anchored[len(before)] = _in_its_spring(bench, bench.anchored(best.effects, best.parameters), best, len(before))
         if tuple(anchored) != best.effects:
             best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects), beat=beat)
     return with_sharp_edges(bench, best, noise, len(before), beat)
+
+
+def _in_its_spring(bench: Bench, effects: Sequence[Effect], fit: Fit, position: int) -> Effect:
+    """An effect of a model; play that the motion never closes as wide as makes it one in a spring of this stiffness.
+
+    Its torque is then about a constant, K times the width, and a fit of both ends wherever it passes.
+
+    Args:
+        bench: the recording.
+        effects: the model, anchored.
+        fit: the model as it was fitted.
+        position: of the effect.
+    """
+    effect = effects[position]
+    if not isinstance(effect, Backlash):
+        return effect
+    deflection = bench.state(effects).motion.deflection[:, bench.robot.index(effect.required_joint)]
+    stiffness = fit.parameters.get(f"{effect.joint}.spring_stiffness", 0.0)
+    least = float(np.min(np.abs(deflection)))
+    if np.ptp(np.sign(deflection)) or effect.half_width > least or not stiffness > 0.0:
+        return effect
+    width = effect.half_width * fit.parameters[effect.parameter_name()] / stiffness
+    return replace(effect, half_width=width) if 0.0 < width < least else effect
 
 
 def _share(effect: SignalEffect, amount: Shape) -> float:
