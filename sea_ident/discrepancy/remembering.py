@@ -2,7 +2,8 @@
 
 An element of spring and dry friction that does not slip is elastic. It adds to the stiffness of the spring, and where
 it slipped last to its zero. On one motion that is a constant in the spring, and is to be called one. Where another
-motion finds another constant there, nothing constant is missing: of what the library has only such an element does that.
+motion finds another constant there, nothing constant is missing: such an element does that, and nothing else that the
+library has.
 """
 
 from dataclasses import replace
