@@ -20,6 +20,9 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 
+CONFIRMED = 0.99
+"""Share of what a constant could explain on another motion from which on it is the same there [-]: to a tenth of it."""
+
 BARELY_STICKS = 1.001
 """Factor of half the travel of a spring beyond which an element in it does not slip to and fro [-], ..."""
 
@@ -42,7 +45,9 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
     """
     now = selection.final.fit
     effect, found = now.effects[position], held.transfers[position - len(now.effects) + selection.added]
-    if not isinstance(effect, SpringOffset) or found.excess < EQUALLY_GOOD * found.unit:
+    if not isinstance(effect, SpringOffset) or not found.tested or found.share > CONFIRMED:
+        return None
+    if found.excess < EQUALLY_GOOD * found.unit:
         return None
     travel = float(np.ptp(bench.data.motion.deflection[:, bench.robot.index(effect.required_joint)]))
     best: tuple[float, Fit] | None = None
