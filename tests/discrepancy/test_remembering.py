@@ -26,7 +26,11 @@ def offset(laboratory):
 
 @pytest.mark.parametrize(
     ("there", "name"),
-    [(HERE, "spring_offset"), (1.02 * HERE, "spring_offset"), (0.4 * HERE, "spring_hysteresis")],
+    [
+        (HERE, "spring_offset"),
+        pytest.param(1.02 * HERE, "spring_offset", marks=pytest.mark.slow),
+        (0.4 * HERE, "spring_hysteresis"),
+    ],
 )
 def test_another_constant_in_another_motion_is_none(laboratory, offset, there, name):
     bench, selection = offset
