@@ -28,6 +28,7 @@ from tests.benchmarks.hidden_effects import catalogue, gap, sensors
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case
 from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
+from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
 from tests.benchmarks.hidden_effects.trajectories import draw_trajectory
@@ -113,6 +114,26 @@ def test_without_its_rotor_coupling_the_plant_is_another_one() -> None:
     torque = np.sqrt(np.mean(exact.tau_motor**2, axis=0))
     link = np.abs(columns.link @ np.where(rotors, 0.0, parameters)) / torque
     assert np.median(link, axis=0).max() > 1e-3
+
+
+@pytest.mark.parametrize(("joint", "other"), [("knee", "hip"), ("ankle", "knee"), ("knee", "ankle")])
+def test_a_coupled_rotor_feels_its_carrier_as_before(joint: str, other: str) -> None:
+    """One effect is hidden, not two: a rotor that lost its carrier would be a `rotor_coupling` besides."""
+    import mujoco
+
+    robot = drawn_truth("exo_leg", generator(3)).robot
+
+    def inertia(*couplings: Coupling) -> np.ndarray:
+        model = build_mjcf(robot, 1e-3, couplings=couplings)
+        data, rows = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+        data.qpos[:] = generator(4).uniform(-1.0, 1.0, model.nq)
+        mujoco.mj_forward(model, data)
+        for row, direction in zip(rows, np.eye(model.nv), strict=True):
+            mujoco.mj_mulM(model, data, row, direction)
+        return rows
+
+    np.testing.assert_allclose(inertia(Coupling(joint, other, 0.0)), inertia(), rtol=1e-9, atol=1e-12)
+    assert not np.allclose(inertia(Coupling(joint, other, 0.1)), inertia(), rtol=1e-3, atol=1e-6)
 
 
 LEFT_OVER = {

@@ -32,6 +32,8 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
 from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
 
 THE_SAME = 0.05
 """Two effects between whose statistics there is less than this are one and the same on this motion."""
@@ -154,6 +156,7 @@ class Transfer:
         tested: whether there was enough to explain to tell.
         statistic: weighted sum of squares that is left there with its parameters as they are.
         excess: what of it is beyond the noise.
+        remembers: whether it needs a constant torque of its own there, which depends on what was before.
         unit: the same over its degrees of freedom with everything free, at least what noise leaves [-].
     """
 
@@ -162,6 +165,7 @@ class Transfer:
     statistic: float = 0.0
     unit: float = 1.0
     excess: float = 0.0
+    remembers: bool = False
 
     @property
     def holds(self) -> bool:
@@ -191,9 +195,16 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         own_signal = [fit.effects[position]] if isinstance(fit.effects[position], SignalEffect) else []
         start = fit.parameters
         known = _known(bench, fit, others)
-        without = bench.fit([*base, *signals], noise, start=start, tangents=False, known=known)
+        beside = [*base, *signals, *_history(fit, others)]
+        without = bench.fit(beside, noise, start=start, tangents=False, known=known)
         whole = _known(bench, fit, added)
-        fixed = bench.fit([*base, *signals, *own_signal], noise, start=start, tangents=False, known=whole)
+        fixed = bench.fit([*beside, *own_signal], noise, start=start, tangents=False, known=whole)
+        unit = max(now.fit.statistic / max(now.fit.dof, 1), 1.0)
+        remembers = False
+        if own_history := _history(fit, [position]):
+            rested = bench.fit([*beside, *own_history], noise, start=start, tangents=False, known=whole)
+            remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
+            fixed = rested if remembers else fixed
         free = (
             bench.refine([*base, *signals, fit.effects[position]], noise, start=start, only=len(base) + len(signals))
             if not others
@@ -203,9 +214,15 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         columns = max(len(fit.effects[position].columns(bench.robot)), 1)
         tested = significance(possible, columns, 10, without, noise) < FAMILY_LEVEL
         share = (without.statistic - fixed.statistic) / possible if possible > 0.0 else 0.0
-        unit = now.fit.statistic / max(now.fit.dof, 1)
-        out.append(Transfer(float(share), bool(tested), fixed.statistic, max(unit, 1.0), fixed.excess))
+        out.append(Transfer(float(share), bool(tested), fixed.statistic, unit, fixed.excess, remembers))
     return out
+
+
+def _history(fit: Fit, positions: Sequence[int]) -> list[Effect]:
+    """The constants that dry friction in springs keeps of the time before, for some effects of a fit."""
+    joints = [fit.effects[p].joint for p in positions if isinstance(fit.effects[p], SpringHysteresis)]
+    present = {effect_key(effect) for effect in fit.effects}
+    return [offset for joint in joints if effect_key(offset := SpringOffset(joint)) not in present]
 
 
 def detectability(

@@ -12,6 +12,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
+from sea_ident.discrepancy.remembering import remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
@@ -106,7 +107,8 @@ def decide(
             selection, held = _with_its_best_shape(bench, selection, held, position)
         own = held.transfers[position - first]
         left: list[Alternative] = []
-        for other in others:
+        memory = remembering(bench, selection, held, position)
+        for other in others if memory is None else (*others, memory):
             fit = other.fit
             if fit is None:
                 left.append(other)
@@ -224,4 +226,7 @@ def _better(one: Transfer, other: Transfer) -> bool:
     """Whether one effect does better than another on the other motion beyond doubt, and holds there."""
     if not (one.tested and one.holds):
         return False
+    if other.remembers and not one.remembers and one.statistic - other.statistic < EQUALLY_GOOD * one.unit:
+        # what is foretold is worth more than what is fitted there
+        return True
     return other.statistic - one.statistic > max(EQUALLY_GOOD * one.unit, UNDECIDED * one.excess)

@@ -11,8 +11,10 @@ from sea_ident.discrepancy.described import from_described_springs
 from sea_ident.discrepancy.edges import with_sharp_edges
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Shape
+from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
@@ -22,6 +24,12 @@ LARGE_AMOUNT = 0.1
 
 SMALLER = 0.1
 """... with this part of it too [-]."""
+
+MOST_LAWS = 4
+"""Rounds in which an effect in a spring follows the law of the spring, and the law the effect."""
+
+BEGINS = 1.1
+"""Factor between the width of a play and the least deflection of a motion within which it closes it hardly [-]."""
 
 NO_BEGINNING = 3.0
 """Times the statistic that comes of the estimate beyond which another amount is further from the truth than that."""
@@ -70,12 +78,50 @@ def refitted(
     if isinstance(effect, SignalEffect):
         best = from_described_springs(bench, best, len(before), noise, start)
     if isinstance(effect, SpringEffect):
-        # the law of the spring was another one as long as the effect was missing
-        anchored = list(best.effects)
-        anchored[len(before)] = bench.anchored(best.effects, best.parameters)[len(before)]
-        if tuple(anchored) != best.effects:
-            best = bench.refine(anchored, noise, start=best.parameters, only=len(bench.effects), beat=beat)
+        best = _in_its_spring(bench, best, noise, len(before), beat)
     return with_sharp_edges(bench, best, noise, len(before), beat)
+
+
+def _in_its_spring(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat: float) -> Fit:
+    """A model with an effect that knows the law of its spring, which was another one as long as the effect was missing.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        noise: noise floor.
+        position: of the effect in it.
+        beat: statistic that is of interest.
+    """
+    for _ in range(MOST_LAWS):
+        anchored = list(fit.effects)
+        anchored[position] = _never_closed(bench, bench.anchored(fit.effects, fit.parameters)[position], fit)
+        if tuple(anchored) == fit.effects:
+            break
+        last, fit = fit, bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects), beat=beat)
+        if abs(last.statistic - fit.statistic) < EQUALLY_GOOD:
+            break
+    return fit
+
+
+def _never_closed(bench: Bench, effect: Effect, fit: Fit) -> Effect:
+    """Play that the motion never closes as wide as makes it one in the spring that it is in.
+
+    Its torque is then about a constant, K times the width. A fit of both ends wherever it passes on that way, at worst
+    with the width at which the motion begins to close it.
+
+    Args:
+        bench: the recording.
+        effect: the effect.
+        fit: the model with it.
+    """
+    if not isinstance(effect, Backlash):
+        return effect
+    deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(effect.required_joint)]
+    stiffness = fit.parameters.get(f"{effect.joint}.spring_stiffness", 0.0)
+    least, own = float(np.min(np.abs(deflection))), fit.parameters[effect.parameter_name()]
+    if np.ptp(np.sign(deflection)) or not stiffness > 0.0 or not own > 0.0 or effect.half_width > BEGINS * least:
+        return effect
+    return replace(effect, half_width=min(effect.half_width * own / stiffness, least / BEGINS))
 
 
 def _share(effect: SignalEffect, amount: Shape) -> float:

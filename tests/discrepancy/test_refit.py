@@ -1,10 +1,13 @@
 """A model with another effect: what cannot win is given up, what can is not."""
 
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.judge import physical
 from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
 
@@ -63,3 +66,21 @@ def test_beginnings_that_are_worse_than_the_estimate_are_not_followed(rippled, s
     assert len(offset.beginnings) == 2
     refitted(bench, right.fit.effects, offset, (), right.noise, right.fit.parameters)
     assert max(steps) < 3.0 * right.fit.statistic
+
+
+def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(laboratory, nothing_missing):
+    """Its torque is K times the width: where a fit of both passes on, no K of another spring may come of it."""
+    bench, _ = nothing_missing
+    deflection = bench.data.motion.deflection
+    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
+    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    assert not np.ptp(np.sign(deflection[:, joint]))
+    spring = bench.robot.spring(name)
+    width, cubic = 0.4 * least, spring.cubic_stiffness / spring.stiffness
+    planted = ("backlash", name, [spring.stiffness], {"half_width": width, "cubic": cubic})
+    bench = laboratory.bench(laboratory.record([planted], periods=6))
+    start = settle(bench, bench.effects)
+    effect = make_effect("backlash", name, half_width=0.8 * least)
+    found = refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters)
+    assert physical(bench, found, -1)
+    assert found.effects[-1].half_width == pytest.approx(width, rel=0.1)

@@ -60,6 +60,10 @@ class Coupling:
 
 
 COUPLED_SHARE = 0.8
+"""Share of the inertia of a rotor that turns with another joint too [-]."""
+
+PARALLEL = 1e-9
+"""How far the cosine of the angle of two parallel axes may be from one [-]."""
 
 
 def build_mjcf(
@@ -155,8 +159,8 @@ def build_mjcf(
     world = grounded + "".join(link(c) for c in children[0] if c not in rotors)
     tendons = "".join(
         f'<fixed name="{c.joint} {c.other}" armature="{COUPLED_SHARE * spins[c.joint] * gears[c.joint] ** 2!r}">'
-        f'<joint joint="{c.joint} rotor" coef="{1.0 / gears[c.joint]!r}"/>'
-        f'<joint joint="{c.other}" coef="{c.ratio!r}"/></fixed>'
+        + "".join(f'<joint joint="{name}" coef="{amount!r}"/>' for name, amount in _turning(model, c, gears).items())
+        + "</fixed>"
         for c in couplings
     )
     gravity = _text(model.gravity.linear)
@@ -166,6 +170,28 @@ def build_mjcf(
         f"<worldbody>{world}</worldbody>{f'<tendon>{tendons}</tendon>' if tendons else ''}</mujoco>"
     )
     return mujoco.MjModel.from_xml_string(text)
+
+
+def _turning(model: pin.Model, coupling: Coupling, gears: dict[str, float]) -> dict[str, float]:
+    """What the stage of a coupled rotor turns by with every joint, in space and over its gear.
+
+    It turns with the links that carry it as the rotor does, where their axes stay parallel to its own: what is hidden
+    is how it turns with another joint, not that it no longer feels its carrier.
+    """
+    gear, data = gears[coupling.joint], model.createData()
+    amounts = {f"{coupling.joint} rotor": 1.0 / gear, coupling.other: coupling.ratio}
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    names = list(model.names)
+    k = names.index(f"{coupling.joint} rotor")
+    spin = data.oMi[k].rotation[:, 2]
+    while (k := int(model.parents[k])) != 0:
+        joint = model.joints[k].createData()
+        model.joints[k].calc(joint, np.zeros(1), np.zeros(1))
+        along = float(spin @ data.oMi[k].rotation @ np.asarray(joint.S).reshape(6)[3:])
+        if abs(abs(along) - 1.0) > PARALLEL:
+            break
+        amounts[names[k]] = amounts.get(names[k], 0.0) + along / gear
+    return amounts
 
 
 def _text(values: object) -> str:

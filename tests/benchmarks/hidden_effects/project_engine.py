@@ -94,7 +94,8 @@ def planted_effects(
         case "spring_hysteresis":
             yield one(0.5 * c, 0.5 * c, slip=s["width"])
         case "backlash":
-            yield one(truth.stiffness[i], half_width=c)
+            # play in series with the whole law of the spring, as in the other engine
+            yield one(truth.stiffness[i], half_width=c, cubic=float(truth.cubic[i] / truth.stiffness[i]))
         case "link_friction":
             yield one(c * s["viscous"], c, smoothing=smoothing)
         case "parallel_spring":

@@ -1,0 +1,48 @@
+"""A constant in a spring that another motion does not confirm: dry friction that does not slip remembers it."""
+
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.decide import decide
+from sea_ident.discrepancy.heldout import tried
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.effects import make_effect
+
+JOINT = "knee"
+HERE = -0.5
+
+
+@pytest.fixture(scope="module")
+def offset(laboratory):
+    """A constant torque in the spring of the knee, found."""
+    bench = laboratory.bench(laboratory.record([("spring_offset", JOINT, [HERE], {})], periods=12))
+    start = settle(bench, bench.effects)
+    model = (*start.fit.effects, make_effect("spring_offset", JOINT))
+    fit = bench.fit(model, start.noise, start=start.fit.parameters)
+    noise = bench.noise(fit)
+    return bench, Selection(start, Settled(bench.fit(model, noise, start=fit.parameters), noise), 1, (1e-9,))
+
+
+@pytest.mark.parametrize(
+    ("there", "name"),
+    [
+        (HERE, "spring_offset"),
+        pytest.param(1.02 * HERE, "spring_offset", marks=pytest.mark.slow),
+        (0.4 * HERE, "spring_hysteresis"),
+    ],
+)
+def test_another_constant_in_another_motion_is_none(laboratory, offset, there, name):
+    bench, selection = offset
+    recording = laboratory.record([("spring_offset", JOINT, [there], {})], periods=8, seed=9, motion=1)
+    held = tried(Bench(laboratory.data(recording), bench.effects), selection, "another motion")
+    position = len(selection.start.fit.effects)
+    found, left, held = decide(bench, selection, {position: ()}, held)
+    assert [effect.name for effect in found.effects] == [name]
+    assert left[position] == ()
+    assert held.transfers[0].holds
+    assert held.transfers[0].remembers == (name == "spring_hysteresis")
+    if name == "spring_hysteresis":
+        # it never slips on the motion that was used
+        travel = bench.data.motion.deflection[:, bench.robot.index(JOINT)]
+        assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
