@@ -16,14 +16,19 @@ from sea_ident.robot import Robot
 
 @dataclass(frozen=True)
 class BaseTilt(Effect):
-    """Gravity in another direction than the description says, for small angles.
+    """Gravity in another direction than the description says.
+
+    Gravity turned by an angle t is g - sin t / t (t x g) + (1 - cos t) / t^2 (t x (t x g)): linear in the angle, but for
+    what is known of it by `angles`.
 
     Attributes:
         joint: None, it acts on the whole robot.
         inertial: (10 b,) standard inertial parameters of all links; empty for those of the description.
+        angles: rotation about the two level axes that the columns hold at, and nearly so close by [rad].
     """
 
     inertial: Sequence[float] = ()
+    angles: Sequence[float] = (0.0, 0.0)
 
     name: ClassVar[str] = "base_tilt"
     side: ClassVar[Side] = Side.LINK
@@ -31,6 +36,7 @@ class BaseTilt(Effect):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inertial", tuple(float(value) for value in self.inertial))
+        object.__setattr__(self, "angles", tuple(float(value) for value in self.angles))
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:
@@ -44,23 +50,30 @@ class BaseTilt(Effect):
         )
 
     def evaluate(self, state: State) -> Contribution:
-        """Torque of the change of gravity for an angle of one."""
+        """Torque of the change of gravity over the angle."""
         inertial = np.array(self.inertial) if len(self.inertial) else state.robot.inertial_parameters
         still = np.zeros_like(state.motion.q)
         motion = state.motion
         held = Motion(motion.time, motion.q, still, still, motion.theta, still, still)
         link, motor = [], []
         gravity = np.asarray(state.robot.model.gravity.linear)
-        for axis in level_axes(gravity):
-            rows = State(with_gravity(state.robot, np.cross(axis, gravity)), held).body_rows(inertial)
+        axes = level_axes(gravity)
+        turn = self.angles[0] * axes[0] + self.angles[1] * axes[1]
+        half = 0.5 * float(np.linalg.norm(turn))
+        along, across = np.sinc(2.0 * half / np.pi), 0.5 * np.sinc(half / np.pi) ** 2
+        for axis in axes:
+            sideways = np.cross(axis, gravity)
+            change = along * sideways - across * np.cross(turn, sideways)
+            rows = State(with_gravity(state.robot, change), held).body_rows(inertial)
             # the base turns by an angle, so gravity turns the other way as the robot sees it
             link.append(-rows.link)
             motor.append(-rows.motor)
         return Contribution(np.concatenate(link, axis=2), np.concatenate(motor, axis=2))
 
     def anchored(self, anchor: Anchor) -> "BaseTilt":
-        """With the inertial parameters of the model."""
-        return replace(self, inertial=anchor.inertial())
+        """With the inertial parameters of the model, and the angles that it has by now."""
+        first, second = (anchor.value(self.parameter_name(label)) for label in ("first", "second"))
+        return replace(self, inertial=anchor.inertial(), angles=(first, second))
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""
