@@ -18,8 +18,8 @@ from sea_ident.robot import Robot
 class BaseTilt(Effect):
     """Gravity in another direction than the description says.
 
-    Gravity turned by an angle t is g - sin t / t (t x g) + (1 - cos t) / t^2 (t x (t x g)): linear in the angle, but for
-    what is known of it by `angles`.
+    Gravity turned by an angle t is g - sin t / t (t x g) + (1 - cos t) / t^2 (t x (t x g)): linear in the angle, but
+    for what is known of it by `angles`.
 
     Attributes:
         joint: None, it acts on the whole robot.
