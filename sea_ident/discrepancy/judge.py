@@ -13,7 +13,9 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.external_force import ExternalForce
+from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.stribeck_friction import StribeckFriction
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
@@ -34,6 +36,9 @@ ALL_THE_TIME = 0.75
 
 SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 """Parameters of the law of a spring with two equal sides."""
+
+DRIVES = 0.1
+"""Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise makes it [-]."""
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
@@ -177,6 +182,19 @@ def pushes_back(bench: Bench, fit: Fit, position: int) -> bool:
     return bool(np.min(slope) > 0.0)
 
 
+def brakes(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether dry friction still brakes beside friction of another law: at any speed, and where the motor hardly moves.
+
+    The law may bend like the sum of a larger one and a dry friction that drives.
+    """
+    effect = fit.effects[position]
+    dry = fit.parameters.get(f"{effect.joint}.coulomb_friction", 0.0)
+    if not isinstance(effect, StribeckFriction | NonlinearViscousFriction) or dry >= 0.0:
+        return True
+    torque = effect.evaluate(bench.state(fit.effects)).motor @ np.array([fit.parameters[effect.parameter_name()]])
+    return bool(-dry < DRIVES * float(np.max(np.abs(torque))))
+
+
 def physical(bench: Bench, fit: Fit, position: int) -> bool:
     """Whether an effect of a model is possible.
 
@@ -193,7 +211,7 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
     values = fit.values[start : start + len(columns)]
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
         return False
-    if not pushes_back(bench, fit, position):
+    if not pushes_back(bench, fit, position) or not brakes(bench, fit, position):
         return False
     spectra = bench.column_spectra(effect, fit.effects)
     power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))

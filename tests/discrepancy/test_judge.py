@@ -70,3 +70,17 @@ def test_a_spring_with_two_sides_is_stiff_to_either_side(nothing_missing, expone
         assert pushes_back(bench, replace(fit, values=values), -1) == grows, amount
         seen.add(grows)
     assert seen == {True, False}
+
+
+@pytest.mark.parametrize("name", ["stribeck_friction", "nonlinear_viscous_friction"])
+def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing, name):
+    bench, start = nothing_missing
+    effect = make_effect(name, "knee")
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    names = [c.name for c in fit.columns]
+    largest = float(np.max(np.abs(effect.evaluate(bench.state(fit.effects)).motor)))
+    for dry, accepted in ((0.5, True), (-0.05, True), (-0.5, False)):
+        values = fit.values.copy()
+        values[names.index("knee.coulomb_friction")] = dry
+        values[names.index(f"knee.{name}")] = 1.0 / largest
+        assert physical(bench, replace(fit, values=values), -1) == accepted
