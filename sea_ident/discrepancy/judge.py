@@ -38,7 +38,7 @@ SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 """Parameters of the law of a spring with two equal sides."""
 
 DRIVES = 0.1
-"""Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise makes it [-]."""
+"""Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise may do [-]."""
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
