@@ -156,8 +156,8 @@ class Transfer:
         tested: whether there was enough to explain to tell.
         statistic: weighted sum of squares that is left there with its parameters as they are.
         excess: what of it is beyond the noise.
+        unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
         remembers: whether it needs a constant torque of its own there, which depends on what was before.
-        unit: the same over its degrees of freedom with everything free, at least what noise leaves [-].
     """
 
     share: float

@@ -14,7 +14,7 @@ VARIANTS_KEPT = 3e8
 """Bytes of columns of candidates that are kept for the next search."""
 
 
-STATES_KEPT = 24
+STATES_KEPT = 12
 """Motions, each corrected by other effects in the chain of signals, that are kept."""
 
 Key = tuple[str, str | None, str]

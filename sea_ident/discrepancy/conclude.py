@@ -271,7 +271,7 @@ def _missing(
                 parameters=tuple(parameters),
                 torque_share=own_torque(bench, fit, position),
                 p_value=selection.p_values[k],
-                alternatives=alternatives.get(position, ()),
+                alternatives=tuple(replace(each, fit=None) for each in alternatives.get(position, ())),
                 transfer=None if transfer is None or not transfer.tested else transfer.share,
                 detail=effect,
                 values=tuple(float(v) for v in fit.values[begin : begin + counts[position]]),

@@ -27,7 +27,7 @@ from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
-from sea_ident.discrepancy.search import Selection, search, without
+from sea_ident.discrepancy.search import Selection, search, still_needed, without
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
@@ -170,7 +170,7 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
         first = found.confirmed
         nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
         again = _less(bench, first.final.fit, found.trends, temperature)
-        found = _searched_mean(again, temperature, tell, first.selection if nearly else None)
+        found = _searched_mean(again, temperature, tell, still_needed(again, first.selection) if nearly else None)
     bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
     return replace(found, bench=bench, confirmed=confirmed)
 

@@ -52,7 +52,7 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
         fit: a model with a push.
         noise: noise floor.
         position: of the push among the effects.
-        beat: statistic that is of interest; what is far above with edges to the sample is left so.
+        beat: statistic that is of interest; what is far above in the best window is left so.
 
     Returns:
         The fit.

@@ -29,7 +29,7 @@ Twenty periods of legs of all kinds fill 0.10 to 0.17 of them. With all of them 
 model that is right in three of ten cases at a nominal twentieth; with a tenth, in 3 to 5 %."""
 
 FEWEST_CLOSED_STEPS = 5
-"""Steps between periods from which on they surely close."""
+"""Steps between periods from which on they are taken to close."""
 
 CLOSED_CORRELATION = (-0.317, -0.183)
 """Correlation of such a step with the next and with the one after it, the mean over a period ..."""
@@ -82,7 +82,7 @@ class NoiseFloor:
 
         And what the variance of a sum of squares that was whitened by it is to be divided by (Hotelling).
         """
-        return max(self.freedom - self.equations, 1.0) / self.freedom
+        return min(max(self.freedom - self.equations, 1.0) / self.freedom, 1.0)
 
     def whitener(self) -> ComplexArray:
         """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
@@ -251,7 +251,9 @@ def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, each: float, basi
     # is smoothed beside it comes out with about half the degrees of freedom
     own = colour / size[:, :, None]
     wide = min(WIDER * _half_width(len(own), count, each), max((len(own) - 1) // 2, 1))
-    typical = np.linalg.cholesky(_moving_mean(np.matmul(own, own.conj().transpose(0, 2, 1)), wide))
+    mean = _moving_mean(np.matmul(own, own.conj().transpose(0, 2, 1)), wide)
+    mean[0] = mean[0].real
+    typical = np.linalg.cholesky(mean)
     rest = Rest(np.asarray(np.linalg.solve(typical, own), dtype=np.complex128), 1.0 - leverage)
     level = np.stack([np.matmul(rest.colour, unstacked(f, count)[:, :, None])[:, :, 0] for f in flat])
     inside = noise_from_steps(level, plain.periods, each, rest)

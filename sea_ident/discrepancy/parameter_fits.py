@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes
-from sea_ident.discrepancy.linear import least_squares, least_squares_near
+from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, stacked
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Parts, Whitening
@@ -119,21 +119,23 @@ class ParameterFits(Tangents):
         residual = target - design @ values
         shapes = free_shapes(effects) if tangents else ()
         stiffness = slopes @ values + beside
+        # not the whitening itself, which keeps the columns of all candidates
+        whitener, free, part_of = whitening.whitener, whitening.free, whitening.parts
 
         def linear() -> tuple[FloatArray, ComplexArray]:
             if noise is None:
                 flat, spectra = parts.scaled(factors), design
             else:
-                flat = self._flat_columns(parts, left, whitening.parts, slopes, scale, factors, stiffness)
+                flat = self._flat_columns(parts, left, part_of, slopes, scale, factors, stiffness)
                 spectra = self.scaled(design, slopes, residual, scale, stiffness)
             if shapes:
                 bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, stiffness)
-                flat = np.concatenate([flat, whitening.flat(bent)], axis=1)
+                flat = np.concatenate([flat, off(free, whiten(whitener, bent))], axis=1)
                 spectra = np.concatenate([spectra, bent], axis=2)
             return flat, spectra
 
         frame = None if shapes else frame
-        return Fit(effects, columns, values, residual, scale, whitened, whitening.free, linear, shapes, frame)
+        return Fit(effects, columns, values, residual, scale, whitened, free, linear, shapes, frame)
 
     def _descend(
         self,

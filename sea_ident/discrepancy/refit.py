@@ -31,6 +31,9 @@ MOST_LAWS = 4
 BEGINS = 1.1
 """Factor between the width of a play and the least deflection of a motion within which it closes it hardly [-]."""
 
+FAR_ABOVE = 4.0
+"""Times the statistic of interest from which on the law of the spring does not make an effect the better one."""
+
 NO_BEGINNING = 3.0
 """Times the statistic that comes of the estimate beyond which another amount is further from the truth than that."""
 
@@ -98,7 +101,7 @@ def _in_its_spring(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, bea
         if tuple(anchored) == fit.effects:
             break
         last, fit = fit, bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects), beat=beat)
-        if abs(last.statistic - fit.statistic) < EQUALLY_GOOD:
+        if abs(last.statistic - fit.statistic) < EQUALLY_GOOD or fit.statistic > FAR_ABOVE * beat:
             break
     return fit
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
@@ -49,7 +50,10 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
         return None
     if found.excess < EQUALLY_GOOD * found.unit:
         return None
-    travel = float(np.ptp(bench.data.motion.deflection[:, bench.robot.index(effect.required_joint)]))
+    if effect_key(SpringHysteresis(effect.joint)) in {effect_key(each) for each in now.effects}:
+        return None
+    motion = bench.state(now.effects).motion
+    travel = float(np.ptp(motion.deflection[:, bench.robot.index(effect.required_joint)]))
     best: tuple[float, Fit] | None = None
     for factor in STICKS:
         effects = list(now.effects)

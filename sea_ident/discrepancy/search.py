@@ -133,8 +133,8 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
     tried: Tried = {}
     if begun is not None and begun.added:
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
-        now, added = _eliminate(bench, now, added, begun.tests, fewest=0)
-        now = exchange(bench, now, len(added), tried)
+        exchanged = exchange(bench, now, len(added), tried)
+        now = now if exchanged is now else _settled(bench, exchanged)
         largest = _largest_changes(bench, now.fit, len(added))
     while True:
         candidates = scan(bench, now.fit, now.noise)
@@ -202,7 +202,7 @@ def next_effect(
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
     ]
     accepted: list[tuple[float, Fit, float]] = []
-    steps = flat_steps(bench, now) if worth else np.zeros((0, 0))
+    steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
     most, explained = 0.0, False
     refits: list[tuple[Candidate, float]] = []
     for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
@@ -210,12 +210,12 @@ def next_effect(
             continue
         leaders = sorted(new.statistic for _, new, _ in accepted)[:LAST_TWO]
         # one that explains too little, or less than those that are compared in the end, need not be known exactly
-        beat = min([fit.statistic - _useful(bench, fit) * fit.excess, *leaders[LAST_TWO - 1 :]])
+        beat = min([fit.statistic - useful, *leaders[LAST_TWO - 1 :]])
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
-        if p_value > FAMILY_LEVEL or not _acceptable(bench, fit, new, steps, smallest):
+        if p_value > FAMILY_LEVEL or gain < useful or not _acceptable(bench, fit, new, steps, smallest):
             continue
         accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
         most, explained = max(most, gain), explained or new.statistic < NEARLY_RIGHT * new.dof
@@ -237,13 +237,25 @@ def next_effect(
     return best[1], best[2]
 
 
-def _useful(bench: Bench, fit: Fit) -> float:
-    """Share of the excess that one effect more must explain [-]."""
-    return USEFUL_SHARE if len(fit.effects) - len(bench.effects) < MANY else USEFUL_BESIDE_MANY
+def least_useful(bench: Bench, now: Settled) -> float:
+    """Drop of the statistic that one effect more must bring.
+
+    Beside many, less is enough where it explains more than one of these does: that one was only found before it.
+    """
+    fit = now.fit
+    usual, positions = USEFUL_SHARE * fit.excess, range(len(bench.effects), len(fit.effects))
+    if len(positions) < MANY:
+        return usual
+    least = USEFUL_BESIDE_MANY * fit.excess
+    for position in positions:
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        without = bench.fit(others, now.noise, start=fit.parameters, tangents=False)
+        least = min(least, without.statistic - fit.statistic)
+    return max(usual, least)
 
 
 def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: FloatArray) -> bool:
-    """Whether the last effect of a new fit explains enough, could be, and is neither hidden nor a matter of one pass.
+    """Whether the last effect of a new fit is large enough, could be, and is neither hidden nor a matter of one pass.
 
     Args:
         bench: the recording.
@@ -253,9 +265,12 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: F
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
     effect = new.effects[-1]
-    if fit.statistic - new.statistic < _useful(bench, fit) * fit.excess or not physical(bench, new, -1):
-        return False
-    if len(bench.slack_links(new)) > len(bench.slack_links(fit)) or at_a_bound(effect) or too_short(bench, effect):
+    if (
+        not physical(bench, new, -1)
+        or len(bench.slack_links(new)) > len(bench.slack_links(fit))
+        or at_a_bound(effect)
+        or too_short(bench, effect)
+    ):
         return False
     own = own_torque(bench, new, -1)
     if own > LARGE_TORQUE and not is_signal(effect) and torque_change(bench, fit, new) < CANCELLED * own:
@@ -273,6 +288,13 @@ def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
     Where the model bent to do without it, the change is larger than the effect and says nothing of its size.
     """
     return np.minimum(torque_changes(bench, before, after), 2.0 * own_torque(bench, after, -1))
+
+
+def still_needed(bench: Bench, selection: Selection) -> Selection:
+    """What is left of what was found before more was known of the recording."""
+    now = settle_again(bench, selection.final.fit)
+    now, p_values = _eliminate(bench, now, list(selection.p_values), selection.tests, fewest=0)
+    return replace(selection, final=now, added=len(p_values), p_values=tuple(p_values))
 
 
 def _eliminate(

@@ -227,7 +227,8 @@ class Tangents(Columns):
     @cached_property
     def _stride(self) -> int:
         """Every which sample is enough for the derivatives of the dynamics: the largest divisor of their number."""
-        samples, enough = self.data.samples, SAMPLES_PER_HARMONIC * self.data.harmonics
+        samples, harmonics = self.data.samples, self.data.harmonics
+        enough = max(SAMPLES_PER_HARMONIC * harmonics, harmonics + self.data.reach + 1)
         return max(k for k in range(1, samples + 1) if samples % k == 0 and (k == 1 or samples // k >= enough))
 
     def _dynamics_derivatives(

@@ -13,6 +13,9 @@ from sea_ident.effects.base import Anchor, Column, Contribution, Effect, Side, S
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
+LARGEST = 1.0
+"""Angle beyond which the columns are not followed: no base stands so, and near a right angle they vanish [rad]."""
+
 
 @dataclass(frozen=True)
 class BaseTilt(Effect):
@@ -72,8 +75,9 @@ class BaseTilt(Effect):
 
     def anchored(self, anchor: Anchor) -> "BaseTilt":
         """With the inertial parameters of the model, and the angles that it has by now."""
-        first, second = (anchor.value(self.parameter_name(label)) for label in ("first", "second"))
-        return replace(self, inertial=anchor.inertial(), angles=(first, second))
+        found = (anchor.value(self.parameter_name(label)) for label in ("first", "second"))
+        angles = tuple(float(np.clip(angle, -LARGEST, LARGEST)) for angle in found)
+        return replace(self, inertial=anchor.inertial(), angles=angles)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""

@@ -97,6 +97,27 @@ def test_what_a_model_leaves_of_means_that_close_has_unit_variance(equations, pe
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.06 if equations == 3 else 0.035)
 
 
+@pytest.mark.parametrize("equations", [2, 4, 6])
+def test_constants_have_a_real_floor_where_noise_of_equations_is_out_of_phase(equations):
+    """A constant has no phase, whatever its neighbours have: what has is counted in none of its numbers."""
+    rng, harmonics, periods = np.random.default_rng(equations), 60, 12
+    phase = rng.standard_normal((2, equations, equations)) / np.sqrt(equations)
+    mixing = np.broadcast_to(np.eye(equations) + phase[0] + 1j * phase[1], (harmonics + 1, equations, equations)).copy()
+    mixing[0] = mixing[0].real
+    power = []
+    for _ in range(40):
+        values = rng.standard_normal((periods, 4 * harmonics, equations))
+        coloured = np.stack([_coloured(mixing, spectrum(value, harmonics)) for value in values])
+        steps = np.diff(coloured, axis=0) / np.sqrt(2.0)
+        noise = noise_from_steps(steps, periods, step_freedom(periods))
+        nothing = np.zeros((equations * (2 * harmonics + 1), 0))
+        for _ in range(2):
+            noise = noise_beside_model(steps, noise, step_freedom(periods), nothing)
+        assert not np.any(noise.covariance[0].imag)
+        power.append(np.mean(np.abs(_coloured(noise.whitener()[:1], coloured.mean(axis=0)[:1])) ** 2))
+    assert np.mean(power) < 1.5
+
+
 def _coloured(mixing, values):
     return np.matmul(mixing, values[:, :, None])[:, :, 0]
 

@@ -9,8 +9,15 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
-from sea_ident.discrepancy.search import BESIDE_ANOTHER, _acceptable, search, visible_changes
-from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.search import (
+    BESIDE_ANOTHER,
+    _acceptable,
+    least_useful,
+    search,
+    still_needed,
+    visible_changes,
+)
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 
 
@@ -64,9 +71,11 @@ def test_a_search_that_goes_on_from_another_keeps_what_is_needed_and_no_more(une
     model = (*found.final.fit.effects, push)
     final = settle_again(bench, bench.fit(model, found.final.noise, start=found.final.fit.parameters))
     begun = replace(found, final=final, added=found.added + 1, p_values=(*found.p_values, 1e-9))
-    assert named(search(bench, bench.effects, begun)) == named(found)
+    assert named(search(bench, bench.effects, still_needed(bench, begun))) == named(found)
     alone = replace(begun, final=settle_again(bench, bench.fit((*bench.effects, push), final.noise)), added=1)
-    assert named(search(bench, bench.effects, replace(alone, p_values=(1e-9,)))) == named(found)
+    left = still_needed(bench, replace(alone, p_values=(1e-9,)))
+    assert left.added == 0
+    assert named(search(bench, bench.effects, left)) == named(found)
 
 
 def test_when_a_push_begins_and_ends_is_paid_for(nothing_missing):
@@ -119,29 +128,41 @@ def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_
 
 
 @pytest.mark.parametrize(
-    ("wave", "share", "beside_few", "beside_many"),
-    [(0.4, 0.7, True, True), (0.75, 0.35, True, False), (1.8, 0.06, False, False)],
+    ("needed", "wave", "share", "beside_few", "beside_many"),
+    [
+        (2.0, 0.4, 0.7, True, True),
+        (2.0, 0.75, 0.35, True, False),
+        (2.0, 1.8, 0.06, False, False),
+        (0.1, 0.75, 0.35, True, True),
+    ],
 )
 def test_beside_many_effects_one_more_must_explain_half_of_what_is_left(
-    nothing_missing, wave, share, beside_few, beside_many
+    nothing_missing, needed, wave, share, beside_few, beside_many
 ):
-    """A ripple, and a wave in time that no effect of the library is: the larger it is, the less the ripple explains."""
+    """A ripple, and a wave in time that no effect of the library is: the larger it is, the less the ripple explains.
+
+    Where it explains more than what was found before it, it is as useful as these are.
+    """
     data = nothing_missing[0].data
     time, theta = data.motion.time - data.motion.time[0], data.motion.theta[:, 0]
     torque = data.tau_motor.copy()
     torque[:, 0] += np.sin(12.0 * theta) + wave * np.sin(2.0 * np.pi * 23.0 * time / data.period)
-    changed = replace(data, tau_motor=torque)
     others = [make_effect("torque_offset", joint) for joint in ("hip", "knee", "ankle")]
     others.append(make_effect("nonlinear_viscous_friction", "ankle", exponent=2.0))
+    state = nothing_missing[0].state(())
+    torque += needed * sum(effect.evaluate(state).motor[:, :, 0] for effect in others)
+    changed = replace(data, tau_motor=torque)
     usual = nothing_missing[0].effects
     bench = Bench(changed, usual)
     fit = bench.fit((*usual, *others), nothing_missing[1].noise)
     new = bench.fit((*fit.effects, make_effect("torque_ripple", "hip", order=12.0)), nothing_missing[1].noise)
     assert (fit.statistic - new.statistic) / fit.excess == pytest.approx(share, abs=0.1)
     quiet, nothing = np.random.default_rng(0).standard_normal((8, len(fit.whitened))), np.zeros(len(data.equations))
+    assert _acceptable(bench, fit, new, quiet, nothing)
     # the same two models, with four effects that were added before it and with three
-    assert _acceptable(bench, fit, new, quiet, nothing) is beside_many
-    assert _acceptable(Bench(changed, (*usual, others[0])), fit, new, quiet, nothing) is beside_few
+    now, gain = Settled(fit, nothing_missing[1].noise), fit.statistic - new.statistic
+    assert (gain >= least_useful(bench, now)) is beside_many
+    assert (gain >= least_useful(Bench(changed, (*usual, others[0])), now)) is beside_few
 
 
 def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
