@@ -130,9 +130,9 @@ def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_
 @pytest.mark.parametrize(
     ("needed", "wave", "share", "beside_few", "beside_many"),
     [
-        (2.0, 0.4, 0.7, True, True),
-        (2.0, 0.75, 0.35, True, False),
-        (2.0, 1.8, 0.06, False, False),
+        (1.0, 0.4, 0.7, True, True),
+        (1.0, 0.75, 0.35, True, False),
+        (1.0, 1.8, 0.06, False, False),
         (0.1, 0.75, 0.35, True, True),
     ],
 )
