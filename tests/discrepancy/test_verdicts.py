@@ -1,5 +1,6 @@
 """Every verdict can be reached, and input that proves nothing never gets a name."""
 
+import pickle
 import warnings
 from dataclasses import replace
 
@@ -78,6 +79,9 @@ def test_ambiguous_with_the_experiment_that_tells(leg, series):
     assert record["gain"] > 1.1
     assert min(record["excitation"]["margins"].values()) >= 0.0
     assert "next experiment" in found.text
+    # it goes to another process, alternatives and all
+    assert any(m.alternatives for m in found.missing)
+    assert pickle.loads(pickle.dumps(found)).text == found.text
 
 
 def test_not_in_the_library_though_something_much_like_it_is(model, intact):
