@@ -64,6 +64,22 @@ def test_what_was_found_stands_still(unequal):
     assert again.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
 
 
+def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
+    """What takes the place of another may come with shapes that are not yet right beside the rest."""
+    bench, found = unequal
+
+    def exchanged(bench, now, added, tried):
+        effects = tuple(replace(e, speed=2.0 * e.speed) if hasattr(e, "speed") else e for e in now.fit.effects)
+        if effects == now.fit.effects:
+            return now
+        return Settled(bench.fit(effects, now.noise, start=now.fit.parameters), now.noise)
+
+    monkeypatch.setitem(search.__globals__, "exchange", exchanged)
+    again = search(bench, bench.effects)
+    assert named(again) == named(found)
+    assert again.final.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
+
+
 def test_a_search_that_goes_on_from_another_keeps_what_is_needed_and_no_more(unequal):
     """Begun with what was found and a push that a drift, known by now, had looked like."""
     bench, found = unequal
