@@ -26,7 +26,7 @@ SURE = 3.0
 LEVEL = 1e-3
 """Probability of naming a trend where there is none."""
 
-MOST_TRENDS = 2
+MOST_TRENDS = 4
 """Largest number of trends that are named."""
 
 CARRIED_ON = 0.3
@@ -161,8 +161,8 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     unnamed = _omnibus(left, middle, noise) < LEVEL
     if unnamed and chosen:
         unexplained = trend_excess(left, middle)
-        if len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
-            chosen = find_trends(numbers, directions, middle, noise, 1, LEVEL, matters)
+        while len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
+            chosen = find_trends(numbers, directions, middle, noise, len(chosen) - 1, LEVEL, matters)
         if unexplained > UNEXPLAINED * trend_excess(flat, middle):
             chosen = []
     column_p = min((c.p_value for c in chosen), default=1.0)
