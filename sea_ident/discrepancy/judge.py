@@ -1,6 +1,7 @@
 """What speaks for an effect in a fit, and what against it."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from sea_ident._typing import FloatArray
@@ -33,6 +34,9 @@ Of three periods with nothing missing a fifth got a name."""
 
 ALL_THE_TIME = 0.75
 """Share of a period from which on a push is none: what pauses now and then acts all the time [-]."""
+
+SMALL_BESIDE = 0.05
+"""Share of the stiffness of a spring that may be in an element of dry friction that sticks all the time [-]."""
 
 SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 """Parameters of the law of a spring with two equal sides."""
@@ -162,9 +166,28 @@ def dissipates(bench: Bench, effect: Effect, values: FloatArray) -> bool:
     """
     if not isinstance(effect, SpringHysteresis):
         return True
-    travel = float(np.ptp(bench.data.motion.deflection[:, bench.robot.index(effect.required_joint)]))
-    slipping = 2.0 * effect.slips < travel
+    slipping = slips_here(bench, effect)
     return float(np.sum(np.abs(values[slipping]))) > SLIPPING * float(np.sum(np.abs(values)))
+
+
+def slips_here(bench: Bench, effect: SpringHysteresis) -> NDArray[np.bool_]:
+    """(2,) which elements of a spring with dry friction slip to and fro on this motion."""
+    travel = float(np.ptp(bench.data.motion.deflection[:, bench.robot.index(effect.required_joint)]))
+    return np.asarray(2.0 * effect.slips < travel)
+
+
+def only_elastic(bench: Bench, fit: Fit, position: int) -> NDArray[np.bool_]:
+    """(k,) columns that are a part of the elastic law of their spring on this motion: they take from it, or give to it.
+
+    An element that sticks all the time has no sign of its own, for the rest of the law is not that of a mere spring
+    either; but it must stay small beside it.
+    """
+    effect = fit.effects[position]
+    values = np.array([fit.parameters[c.name] for c in effect.columns(bench.robot)])
+    if not isinstance(effect, SpringHysteresis):
+        return np.zeros(len(values), dtype=np.bool_)
+    stiffness = fit.parameters.get(f"{effect.joint}.spring_stiffness", 0.0)
+    return ~slips_here(bench, effect) & (np.abs(values) / effect.slips < SMALL_BESIDE * stiffness)
 
 
 def pushes_back(bench: Bench, fit: Fit, position: int) -> bool:
@@ -218,8 +241,9 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
     total = np.sqrt(np.sum(np.abs(spectra @ values) ** 2, axis=0))
     if np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms):
         return False
+    elastic = only_elastic(bench, fit, position)
     for k, column in enumerate(columns):
         wrong = column.nonnegative and values[k] < -2.0 * fit.std(start + k)
-        if wrong and power[k] > EXCUSED * float(power.sum()):
+        if wrong and not elastic[k] and power[k] > EXCUSED * float(power.sum()):
             return False
     return True
