@@ -77,7 +77,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
                 continue
             beat = fit.statistic + enough
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
-            price = penalty(candidate.effect, bench) - penalty(own, bench)
+            price = fit.unit * (penalty(candidate.effect, bench) - penalty(own, bench))
             if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
                 continue
             if new.statistic - fit.statistic < enough and physical(bench, new, position):
@@ -100,7 +100,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
 
 def no_worse(fit: Fit, gain: float) -> float:
     """Difference of the statistic up to which another effect does as well as the one of a fit that has this gain."""
-    unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+    unit = fit.unit
     if unit > NEARLY_RIGHT and fit.excess < LITTLE_LEFT * gain:
         return max(EQUALLY_GOOD * unit, NO_BETTER * fit.excess)
     return EQUALLY_GOOD * unit
@@ -199,7 +199,7 @@ def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]
         without = bench.fit(beside, noise, start=start, tangents=False, known=known)
         whole = _known(bench, fit, added)
         fixed = bench.fit([*beside, *own_signal], noise, start=start, tangents=False, known=whole)
-        unit = max(now.fit.statistic / max(now.fit.dof, 1), 1.0)
+        unit = now.fit.unit
         remembers = False
         if own_history := _history(fit, [position]):
             rested = bench.fit([*beside, *own_history], noise, start=start, tangents=False, known=whole)

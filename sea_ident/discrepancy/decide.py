@@ -61,13 +61,14 @@ def simplest_first(
             others = tuple(
                 replace(a, fit=None if a.fit is None else _beside(bench, selection, position, a.fit)) for a in others
             )
-        best, price = None, now.statistic + penalty(own, bench) - CLEARLY
+        best, price = None, now.statistic + now.unit * (penalty(own, bench) - CLEARLY)
         for other in others:
             if other.fit is None:
                 continue
             own_price = penalty(other.fit.effects[position], bench)
-            if own_price < penalty(own, bench) and other.fit.statistic + own_price < price:
-                best, price = other, other.fit.statistic + own_price
+            whole = other.fit.statistic + now.unit * own_price
+            if own_price < penalty(own, bench) and whole < price:
+                best, price = other, whole
         if best is not None and best.fit is not None:
             selection = replace(selection, final=Settled(best.fit, selection.final.noise))
             out = Alternative(own.name, own.joint, best.cos2, now)
@@ -190,7 +191,7 @@ def _open_shapes(
     # each compared with the fit as it was found in one and the same noise floor
     noise = bench.noise(fit)
     base = bench.fit(fit.effects, noise, start=fit.parameters)
-    enough = EQUALLY_GOOD * max(base.statistic / max(base.dof, 1), 1.0)
+    enough = EQUALLY_GOOD * base.unit
     for ways in _other_shapes(bench, fit, position):
         last = found
         for effect in ways:

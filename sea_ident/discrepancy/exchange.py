@@ -66,8 +66,8 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried) -> Settled:
                 continue
             if last is not None and not last.again(promised):
                 continue
-            better = best.statistic + penalty(best.effects[position], bench) - 1.0
-            beat = better - penalty(candidate.effect, bench)
+            dearer = penalty(best.effects[position], bench) - penalty(candidate.effect, bench)
+            beat = best.statistic + fit.unit * (dearer - 1.0)
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
             possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])

@@ -80,6 +80,11 @@ class Fit:
         return int(len(self.whitened) - self.free.shape[1] - self.basis.shape[1])
 
     @property
+    def unit(self) -> float:
+        """What a difference of the statistic is measured in, where the model leaves more than noise; at least one."""
+        return max(self.statistic / max(self.dof, 1), 1.0)
+
+    @property
     def excess(self) -> float:
         """Part of the statistic beyond what noise leaves, at least zero."""
         return max(self.statistic - self.dof, 0.0)

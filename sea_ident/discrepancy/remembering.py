@@ -59,7 +59,7 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
         effects = list(now.effects)
         effects[position] = SpringHysteresis(joint=effect.joint, slip=0.5 * BARELY_STICKS * factor * travel)
         fit = bench.fit(effects, selection.final.noise, start=now.parameters)
-        if fit.statistic - now.statistic > EQUALLY_GOOD * max(now.statistic / max(now.dof, 1), 1.0):
+        if fit.statistic - now.statistic > EQUALLY_GOOD * now.unit:
             continue
         stiff = fit.parameters[f"{effect.joint}.spring_stiffness"] > 0.0
         if not stiff or any(fit.parameters[column.name] < 0.0 for column in effects[position].columns(bench.robot)):

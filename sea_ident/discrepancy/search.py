@@ -201,14 +201,14 @@ def next_effect(
     worth = [
         c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
     ]
-    accepted: list[tuple[float, Fit, float]] = []
+    accepted: list[tuple[Fit, float]] = []
     steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
     most, explained = 0.0, False
     refits: list[tuple[Candidate, float]] = []
     for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most and explained:
             continue
-        leaders = sorted(new.statistic for _, new, _ in accepted)[:LAST_TWO]
+        leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]
         # one that explains too little, or less than those that are compared in the end, need not be known exactly
         beat = min([fit.statistic - useful, *leaders[LAST_TWO - 1 :]])
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
@@ -217,15 +217,17 @@ def next_effect(
         refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
         if p_value > FAMILY_LEVEL or gain < useful or not _acceptable(bench, fit, new, steps, smallest):
             continue
-        accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
+        accepted.append((new, p_value))
         most, explained = max(most, gain), explained or new.statistic < NEARLY_RIGHT * new.dof
     if not accepted:
         return None
-    accepted.sort(key=lambda item: item[0])
+    # what is left by the best is left by lack of other effects as well, and small differences are a matter of these
+    unit = min((new for new, _ in accepted), key=lambda new: new.statistic).unit
+    accepted.sort(key=lambda item: item[0].statistic + unit * penalty(item[0].effects[-1], bench))
     best: tuple[float, Fit, float] | None = None
-    for _, new, p_value in accepted[:LAST_TWO]:
+    for new, p_value in accepted[:LAST_TWO]:
         whole = bench.refine(new.effects, noise, start=new.parameters) if len(accepted) > 1 else new
-        score = whole.statistic + penalty(new.effects[-1], bench)
+        score = whole.statistic + unit * penalty(new.effects[-1], bench)
         if best is None or score < best[0]:
             best = (score, new, p_value)
     if best is None:

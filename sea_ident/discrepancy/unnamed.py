@@ -123,7 +123,7 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
         others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
-        unit = max(fit.statistic / max(fit.dof, 1), 1.0)
+        unit = fit.unit
         for candidate in scan(bench, reduced, noise, family)[:TRIED_FOR_TWO]:
             if candidate.gain < ALL_OF_IT * gain:
                 break
@@ -175,7 +175,7 @@ def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
         if new.excess > LEAVES * fit.excess:
             # the shapes of the model are those beside the named effect
             new = bench.refine(new.effects, noise, start=new.parameters)
-        unit = max(new.statistic / max(new.dof, 1), 1.0)
+        unit = new.unit
         share = new.excess / max(fit.excess, 1.0)
         if fit.statistic - new.statistic < better * unit:
             continue
