@@ -12,6 +12,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
+from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
 from sea_ident.discrepancy.data import period_data, wide_processing
@@ -23,6 +24,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
@@ -217,12 +219,31 @@ def _tested(
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
-    while weak := _out(held, len(trends.trends)):
-        selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
-        held = held.again(selection)
-        selection, alternatives, held = decide(bench, selection, alternatives, held)
-        confirmed = confirmed.less(selection)
+    confirmed, alternatives, held, ruled_out = _without_the_weak(bench, confirmed, alternatives, held, trends)
+    if ruled_out and confirmed.selection.added and lack_of_fit(bench, confirmed.selection.final)[2] < LACK_LEVEL:
+        # what spoke for an effect that does not hold is still there, and another one may stand behind it
+        left = confirmed.selection
+        other = confirm(bench, search(bench, bench.effects, left, ruled_out))
+        if other.selection.added > left.added:
+            selection, others = _with_alternatives(bench, other.selection)
+            selection, others, there = decide(bench, selection, others, held.again(selection))
+            other, others, there, more = _without_the_weak(bench, other.less(selection), others, there, trends)
+            if other.selection.added > left.added:
+                confirmed, alternatives, held = other, others, there
     return confirmed, alternatives, held, notes
+
+
+def _without_the_weak(
+    bench: Bench, confirmed: Confirmed, alternatives: Alternatives, held: HeldOut, trends: TrendTest
+) -> tuple[Confirmed, Alternatives, HeldOut, set[Key]]:
+    """What holds on another motion of what was found, its alternatives there, and what was ruled out."""
+    ruled_out: set[Key] = set()
+    while weak := _out(held, len(trends.trends)):
+        ruled_out |= {effect_key(confirmed.selection.effects[k]) for k in weak}
+        selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
+        selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
+        confirmed = confirmed.less(selection)
+    return confirmed, alternatives, held, ruled_out
 
 
 def _out(held: HeldOut, drifting: int) -> list[int]:

@@ -1,5 +1,6 @@
 """Effects that were added, replaced by better ones now that the others are there."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.bench import Bench
@@ -47,8 +48,19 @@ class Outdone:
 Tried = dict[tuple[Key, Key], Outdone]
 
 
-def exchange(bench: Bench, now: Settled, added: int, tried: Tried) -> Settled:
-    """Replace effects that were added by better ones, now that the others are there and the noise floor is right."""
+def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key] = ()) -> Settled:
+    """Replace effects that were added by better ones, now that the others are there and the noise floor is right.
+
+    Args:
+        bench: the recording.
+        now: the model with what was added.
+        added: number of effects added.
+        tried: what did not take the place of another before; what does not now is noted.
+        ruled_out: effects that are not tried.
+
+    Returns:
+        The model with the better ones.
+    """
     first = len(now.fit.effects) - added
     for position in range(first, first + added):
         fit, noise = now.fit, now.noise
@@ -57,8 +69,8 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried) -> Settled:
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         own, explained = effect_key(fit.effects[position]), max(reduced.statistic - fit.statistic, 1e-300)
-        best = fit
-        rivals = [c for c in scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise)) if c.key != own]
+        best, scanned = fit, scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
+        rivals = [c for c in scanned if c.key != own and c.key not in ruled_out]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
             promised = candidate.gain / explained
             last = tried.get((own, candidate.key))

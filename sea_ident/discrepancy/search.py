@@ -1,6 +1,6 @@
 """Which effects are missing: forward selection with a family-wise level, exchange, backward elimination."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
-from sea_ident.discrepancy.columns import effect_key
+from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.edges import sharpened
 from sea_ident.discrepancy.exchange import Outdone, Tried, exchange
 from sea_ident.discrepancy.fit import Fit
@@ -115,7 +115,9 @@ class Selection:
         return effects[len(effects) - self.added :] if self.added else ()
 
 
-def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = None) -> Selection:
+def search(
+    bench: Bench, effects: Sequence[Effect], begun: Selection | None = None, ruled_out: Collection[Key] = ()
+) -> Selection:
     """Find the effects that a model lacks.
 
     Args:
@@ -123,6 +125,7 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
         effects: the model.
         begun: what was found with other samples left out, or before what drifts was known, to go on from; nothing by
             default.
+        ruled_out: effects that are not looked for: other data spoke against them.
 
     Returns:
         The model before and after, with what was added.
@@ -133,11 +136,11 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
     tried: Tried = {}
     if begun is not None and begun.added:
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
-        exchanged = exchange(bench, now, len(added), tried)
+        exchanged = exchange(bench, now, len(added), tried, ruled_out)
         now = now if exchanged is now else _settled(bench, exchanged)
         largest = _largest_changes(bench, now.fit, len(added))
     while True:
-        candidates = scan(bench, now.fit, now.noise)
+        candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
         if len(added) >= MOST_EFFECTS:
             break
@@ -149,7 +152,7 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
         added.append(p_value)
         last = now
         now = _settled(bench, settle_again(bench, new))
-        exchanged = exchange(bench, now, len(added), tried)
+        exchanged = exchange(bench, now, len(added), tried, ruled_out)
         now = now if exchanged is now else _settled(bench, exchanged)
         sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
         now = now if sharp is now.fit else settle_again(bench, sharp)
