@@ -227,7 +227,7 @@ def _tested(
         if other.selection.added > left.added:
             selection, others = _with_alternatives(bench, other.selection)
             selection, others, there = decide(bench, selection, others, held.again(selection))
-            other, others, there, more = _without_the_weak(bench, other.less(selection), others, there, trends)
+            other, others, there, _ = _without_the_weak(bench, other.less(selection), others, there, trends)
             if other.selection.added > left.added:
                 confirmed, alternatives, held = other, others, there
     return confirmed, alternatives, held, notes

@@ -187,7 +187,8 @@ def only_elastic(bench: Bench, fit: Fit, position: int) -> NDArray[np.bool_]:
     if not isinstance(effect, SpringHysteresis):
         return np.zeros(len(values), dtype=np.bool_)
     stiffness = fit.parameters.get(f"{effect.joint}.spring_stiffness", 0.0)
-    return ~slips_here(bench, effect) & (np.abs(values) / effect.slips < SMALL_BESIDE * stiffness)
+    small = np.abs(values) / effect.slips < SMALL_BESIDE * stiffness
+    return np.asarray(small & ~slips_here(bench, effect))
 
 
 def pushes_back(bench: Bench, fit: Fit, position: int) -> bool:
