@@ -37,6 +37,23 @@ def test_a_spring_that_takes_next_to_no_energy_out_is_not_accepted(nothing_missi
 
 
 @pytest.mark.parametrize(
+    ("share", "wide", "accepted"),
+    [
+        (0.3, -0.3, True),  # sticks all the time: a part of the elastic law, which it makes a little softer
+        (0.3, -9.0, False),  # by more than its stiffness is worth
+        (0.1, -0.3, False),  # slips, and would give energy
+    ],
+)
+def test_dry_friction_in_a_spring_has_no_sign_where_it_sticks(nothing_missing, share, wide, accepted):
+    bench, start = nothing_missing
+    effect = make_effect("spring_hysteresis", "hip", slip=share * float(np.ptp(bench.data.motion.deflection[:, 0])))
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    values = fit.values.copy()
+    values[-2:] = 1.5, wide
+    assert physical(bench, replace(fit, values=values), -1) == accepted
+
+
+@pytest.mark.parametrize(
     ("shares", "drifting", "out"),
     [
         ([0.9, 0.8], 0, []),

@@ -46,6 +46,17 @@ def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
     }
 
 
+def test_a_third_drift_has_a_name_too(laboratory):
+    planted = [
+        ("stiffness_drift", "ankle", [-20.0], {}),
+        ("stiffness_drift", "hip", [-60.0], {}),
+        ("torque_constant_drift", "knee", [-0.1], {}),
+    ]
+    found = compared(laboratory.bench(laboratory.record(planted, periods=12)))
+    assert {(t.effect.name, t.effect.joint) for t in found.trends} == {(name, joint) for name, joint, *_ in planted}
+    assert not found.unnamed
+
+
 def test_drifts_have_their_values(opposite):
     """Whichever time constant was taken: the change within the minute that was recorded."""
     for trend in opposite.trends:
