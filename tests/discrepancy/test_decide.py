@@ -111,6 +111,25 @@ def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_tur
     assert left == {first: (), first + 1: ()}
 
 
+def test_what_is_ruled_out_makes_room_for_what_it_stood_in_for(laboratory):
+    """The wrong friction at the knee does not hold on the other motion: the search goes on beside what does."""
+    planted = [("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0}), ("load_dependent_friction", JOINT, [0.15], {})]
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    start = settle(bench, bench.effects)
+    found = {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
+    wrong = found["torque_ripple", "hip"], found["position_dependent_friction", JOINT]
+    model = (*start.fit.effects, *wrong)
+    fit = bench.refine(model, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    selection = Selection(start, Settled(fit, start.noise), 2, (1e-9, 1e-9))
+    confirmed = Confirmed(selection, bench, start, selection.final)
+    again = laboratory.record(planted, periods=8, seed=9, motion=1)
+    now, _, held, _ = _tested(bench, confirmed, {}, TrendTest(1.0, (), False), again)
+    named = {(effect.name, effect.joint) for effect in now.selection.effects}
+    assert named == {("torque_ripple", "hip"), ("load_dependent_friction", JOINT)}
+    assert all(transfer.holds for transfer in held.transfers)
+    assert now.final.fit.statistic < 1.2 * now.final.fit.dof
+
+
 def test_what_neither_explains_leans_to_none():
     """Where much is left on the other motion, a difference that is small beside that decides nothing."""
     leaning = 27.0
