@@ -7,6 +7,7 @@ import numpy as np
 
 from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
@@ -63,7 +64,7 @@ def simplest_first(
             )
         best, price = None, now.statistic + now.unit * (penalty(own, bench) - CLEARLY)
         for other in others:
-            if other.fit is None:
+            if other.fit is None or _twice(other.fit, position, selection.added):
                 continue
             own_price = penalty(other.fit.effects[position], bench)
             whole = other.fit.statistic + now.unit * own_price
@@ -75,6 +76,12 @@ def simplest_first(
             others, changed = (out, *(a for a in others if a is not best)), True
         kept[position] = others
     return selection, kept
+
+
+def _twice(fit: Fit, position: int, added: int) -> bool:
+    """Whether the effect at a position is there at another one too, of those that were added."""
+    keys = [effect_key(effect) for effect in fit.effects[len(fit.effects) - added :]]
+    return keys.count(effect_key(fit.effects[position])) > 1
 
 
 def _beside(bench: Bench, selection: Selection, position: int, fit: Fit) -> Fit:
@@ -120,6 +127,8 @@ def decide(
             if changed:
                 # it was fitted beside an effect that is out by now
                 fit = _beside(bench, selection, position, fit)
+            if _twice(fit, position, selection.added):
+                continue
             replaced = replace(selection, final=Settled(fit, selection.final.noise))
             there = held.again(replaced)
             rival = there.transfers[position - first]

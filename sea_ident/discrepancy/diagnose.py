@@ -220,9 +220,10 @@ def _tested(
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     confirmed, alternatives, held, ruled_out = _without_the_weak(bench, confirmed, alternatives, held, trends)
-    if ruled_out and confirmed.selection.added and lack_of_fit(bench, confirmed.selection.final)[2] < LACK_LEVEL:
+    left = confirmed.selection
+    lacks = bool(left.added and ruled_out) and lack_of_fit(bench, left.final)[2] < LACK_LEVEL
+    if lacks and explains_nearly_all(bench, left.start.fit, left.final):
         # what spoke for an effect that does not hold is still there, and another one may stand behind it
-        left = confirmed.selection
         other = confirm(bench, search(bench, bench.effects, left, ruled_out))
         if other.selection.added > left.added:
             selection, others = _with_alternatives(bench, other.selection)
