@@ -8,14 +8,16 @@ from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import Confirmed
-from sea_ident.discrepancy.decide import _better, decide
+from sea_ident.discrepancy.decide import _better, decide, simplest_first
 from sea_ident.discrepancy.diagnose import _tested
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import Kind, tried
+from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.effects import make_effect
 
 JOINT = "knee"
 
@@ -109,6 +111,37 @@ def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_tur
     selection, left, _ = decide(bench, selection, listed, tried(other, selection, "another motion"))
     assert [e.name for e in selection.effects] == ["spring_offset", "load_dependent_friction"]
     assert left == {first: (), first + 1: ()}
+
+
+def test_what_another_effect_leaves_speaks_for_no_wave(laboratory):
+    """Beside a tilted base that is not known yet a wave takes up a little more than the constant that it stands for."""
+    planted = [("torque_offset", JOINT, [2.0], {}), ("base_tilt", None, [0.0, -0.05], {})]
+    bench = laboratory.bench(laboratory.record(planted))
+    start, position = settle(bench, bench.effects), len(bench.effects)
+    effects = make_effect("torque_offset", JOINT), make_effect("torque_ripple", JOINT, order=2.0)
+    constant, wave = (
+        refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters) for effect in effects
+    )
+    dearer = penalty(wave.effects[-1], bench) - penalty(effects[0], bench)
+    assert dearer < constant.statistic - wave.statistic < wave.unit * dearer
+    selection = Selection(start, Settled(wave, start.noise), 1, (1e-9,))
+    listed = {position: (Alternative("torque_offset", JOINT, 1.0, constant),)}
+    assert simplest_first(bench, selection, listed)[0].effects[0].name == "torque_offset"
+
+
+def test_what_is_in_the_model_is_no_alternative_to_another_part_of_it(rivals):
+    bench, other, start, _ = rivals
+    position = len(start.fit.effects)
+    pair = make_effect("spring_offset", JOINT), make_effect("spring_hysteresis", JOINT)
+    both, twice = (
+        bench.fit((*start.fit.effects, pair[0], each), start.noise, start=start.fit.parameters)
+        for each in (pair[1], pair[0])
+    )
+    selection = Selection(start, Settled(both, start.noise), 2, (1e-9, 1e-9))
+    listed = {position + 1: (Alternative("spring_offset", JOINT, 1.0, twice),)}
+    assert simplest_first(bench, selection, listed)[0] is selection
+    held = tried(other, selection, "another motion")
+    assert decide(bench, selection, listed, held)[:2] == (selection, {position + 1: ()})
 
 
 def test_what_is_ruled_out_makes_room_for_what_it_stood_in_for(laboratory):
