@@ -115,7 +115,9 @@ class Selection:
         return effects[len(effects) - self.added :] if self.added else ()
 
 
-def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = None) -> Selection:
+def search(
+    bench: Bench, effects: Sequence[Effect], begun: Selection | None = None, start: Settled | None = None
+) -> Selection:
     """Find the effects that a model lacks.
 
     Args:
@@ -123,11 +125,12 @@ def search(bench: Bench, effects: Sequence[Effect], begun: Selection | None = No
         effects: the model.
         begun: what was found with other samples left out, or before what drifts was known, to go on from; nothing by
             default.
+        start: the model, settled on this bench, where that was done already.
 
     Returns:
         The model before and after, with what was added.
     """
-    start = settle(bench, effects)
+    start = settle(bench, effects) if start is None else start
     now, added = start, list[float]()
     largest = np.zeros(len(bench.data.equations))
     tried: Tried = {}
