@@ -101,9 +101,10 @@ def span(columns: FloatArray) -> FloatArray:
     if columns.shape[1] == 0:
         return np.zeros((len(columns), 0))
     scaled = columns / _norms(columns)
-    basis = _by_products(scaled)
-    if basis is not None:
-        return basis
+    made = _by_products(scaled)
+    if made is not None:
+        return made
+    basis: FloatArray
     basis, r = scipy.linalg.qr(scaled, mode="economic", overwrite_a=True, check_finite=False)
     if columns.shape[1] < len(columns) and scipy.linalg.lapack.dtrcon(r)[0] > FAR_FROM_SINGULAR:
         return basis
