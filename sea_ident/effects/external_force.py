@@ -68,7 +68,7 @@ class ExternalForce(Effect):
     def evaluate(self, state: State) -> Contribution:
         """-J' while it pushes, less in the samples in which it begins and ends: as much as it pushes about them."""
         share = self.share_of(state.motion.time)
-        link = -_jacobians(state, self._body(state.robot), share > 0.0, self._point) * share[:, None, None]
+        link = _jacobians(state, self._body(state.robot), share > 0.0, self._point) * -share[:, None, None]
         return Contribution(link, np.broadcast_to(0.0, link.shape))
 
     def share_of(self, time: FloatArray) -> FloatArray:
@@ -135,7 +135,7 @@ class ExternalForce(Effect):
 
 
 def _jacobians(state: State, body: int, wanted: NDArray[np.bool_], point: FloatArray) -> FloatArray:
-    """(N, n, 3) transposed Jacobians of a point of a body in the link rows, zero where not `wanted` (N,).
+    """(N, n, 3) transposed Jacobians of a point of a body in the link rows, right at least where `wanted` (N,).
 
     The point is given from the centre of mass, in the axes of the body. What does not depend on it is computed once per
     state, and the last point is kept: many pushes that differ by their edges alone are compared there.
@@ -165,7 +165,7 @@ def _jacobians(state: State, body: int, wanted: NDArray[np.bool_], point: FloatA
             # a point away from the centre moves with the rotation too: v + w x arm
             last[body] = point, moved + np.cross(rows[:, :, 3:], (turns @ point)[:, None])
         moved = last[body][1]
-    return np.where(wanted[:, None, None], moved, 0.0)
+    return moved
 
 
 def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray, point: FloatArray) -> FloatArray:
