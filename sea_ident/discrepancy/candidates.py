@@ -283,7 +283,7 @@ def _exactly(
     strength = np.sum(across**2, axis=0)
     across[:, strength <= ABSORBED] = 0.0
     size = np.where(norms > 0.0, norms, 1.0)
-    values = np.linalg.pinv(across, rcond=1e-4) @ left / size
+    values = _estimates(across, left) / size
     if not _allowed(bench, fit, effect, values):
         values = _allowed_part(bench, effect, across, left) / size
     gain = float((across * size * values).sum(axis=1) @ left)
@@ -302,12 +302,22 @@ def _exactly(
     )
 
 
+def _estimates(across: FloatArray, left: FloatArray) -> FloatArray:
+    """(k,) least squares with columns (M, k) that may depend on each other."""
+    if across.shape[1] == 1:
+        power = float(across[:, 0] @ across[:, 0])
+        return np.array([float(across[:, 0] @ left) / power if power > 0.0 else 0.0])
+    return np.asarray(np.linalg.pinv(across, rcond=1e-4) @ left, dtype=np.float64)
+
+
 def _allowed_part(bench: Bench, effect: Effect, across: FloatArray, left: FloatArray) -> FloatArray:
     """(k,) estimates with as many columns as physics allows: those of the wrong sign are held at zero."""
     lower = [0.0 if c.nonnegative else -np.inf for c in effect.columns(bench.robot)]
     scale = np.linalg.norm(across, axis=0)
     usable = scale > 0.0
     values = np.zeros(across.shape[1])
+    if len(values) == 1:
+        return np.maximum(_estimates(across, left), lower)
     if np.any(usable):
         bounds = (np.array(lower)[usable], np.full(int(usable.sum()), np.inf))
         values[usable] = lsq_linear(across[:, usable], left, bounds).x

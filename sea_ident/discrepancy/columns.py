@@ -6,7 +6,7 @@ import numpy as np
 
 from sea_ident._typing import IntArray
 from sea_ident.discrepancy.data import PeriodData, equation_row, spectrum
-from sea_ident.discrepancy.free_shapes import seen_by, signal_effects
+from sea_ident.discrepancy.free_shapes import moving, seen_by, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Anchor, Column, Contribution, Effect, State, corrected_motion
 
@@ -16,6 +16,9 @@ VARIANTS_KEPT = 3e8
 
 STATES_KEPT = 12
 """Motions, each corrected by other effects in the chain of signals, that are kept."""
+
+LABELS_KEPT = 1000
+"""Effects of which the labels of the columns are kept."""
 
 Key = tuple[str, str | None, str]
 """Name of an effect, its joint, and the other joint where there is one."""
@@ -36,12 +39,13 @@ class Columns:
         self.robot = data.robot
         self._states: dict[tuple[Effect, ...], State] = {}
         self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
+        self._labels: dict[Effect, tuple[Column, ...]] = {}
         self._places: dict[Key, IntArray] = {}
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
 
     def state(self, effects: Sequence[Effect]) -> State:
         """Robot and mean motion, with the errors of the sensors taken out that the effects describe."""
-        signals = signal_effects(effects)
+        signals = moving(signal_effects(effects))
         if signals not in self._states:
             if len(self._states) > STATES_KEPT:
                 self._states.pop(next(k for k in self._states if k))
@@ -95,7 +99,10 @@ class Columns:
         for signal in signals:
             parts = [signal.shifted(self.robot, self.data.motion.time, part) for part in parts]
         touched, found = [], []
+        joints = {part.joint for part in parts}
         for e, equation in enumerate(self.data.equations):
+            if None not in joints and equation.index not in joints:
+                continue
             rows = [equation_row(equation, part) for part in parts]
             if any(np.any(row) for row in rows):
                 touched.append(e)
@@ -121,11 +128,19 @@ class Columns:
 
     def labels(self, effects: Sequence[Effect]) -> tuple[Column, ...]:
         """(p,) labels of the columns of a model."""
-        return tuple(column for effect in effects for column in effect.columns(self.robot))
+        return tuple(column for effect in effects for column in self.labels_of(effect))
+
+    def labels_of(self, effect: Effect) -> tuple[Column, ...]:
+        """(k,) labels of the columns of one effect."""
+        if effect not in self._labels:
+            if len(self._labels) > LABELS_KEPT:
+                self._labels.clear()
+            self._labels[effect] = effect.columns(self.robot)
+        return self._labels[effect]
 
     def counts(self, effects: Sequence[Effect]) -> list[int]:
         """Number of columns of every effect."""
-        return [len(effect.columns(self.robot)) for effect in effects]
+        return [len(self.labels_of(effect)) for effect in effects]
 
     def anchored(self, effects: Sequence[Effect], parameters: dict[str, float] | None) -> tuple[Effect, ...]:
         """The same effects, knowing what they need of the rest of the model."""

@@ -30,7 +30,7 @@ from sea_ident.discrepancy.reference import compare_with_reference
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, still_needed, without
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
@@ -167,7 +167,8 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
     start = settle(bench, bench.effects)
     before = compare_periods(bench, start.fit, temperature)
-    found = _searched_mean(_less(bench, start.fit, before, temperature), temperature, tell)
+    less = _less(bench, start.fit, before, temperature)
+    found = _searched_mean(less, temperature, tell, start=start if less is bench else None)
     if _names(found.trends) != _names(before):
         first = found.confirmed
         nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
@@ -178,9 +179,13 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
 
 
 def _searched_mean(
-    bench: Bench, temperature: FloatArray | None, tell: Progress, begun: Selection | None = None
+    bench: Bench,
+    temperature: FloatArray | None,
+    tell: Progress,
+    begun: Selection | None = None,
+    start: Settled | None = None,
 ) -> _Found:
-    confirmed = confirm(bench, search(bench, bench.effects, begun))
+    confirmed = confirm(bench, search(bench, bench.effects, begun, start=start))
     notes: tuple[str, ...] = ()
     if unexplained(confirmed):
         tell("searching without what is slow", 0.35)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off, span, whiten
@@ -126,7 +126,9 @@ def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, strid
     others = [e for k, e in enumerate(fit.effects) if k != position]
     without = bench.fit(others, noise, start=fit.parameters)
     rest = _Rest(fit.effects[position], others, without.scale, without.off(without.whitened), without.off)
-    instants, gains = _windows(bench, rest, noise, edges, kept=True)
+    instants, columns = _windows(bench, rest, noise, edges, kept=True)
+    every = np.arange(len(instants))
+    gains = _window_gains(columns, rest.left, every, every)
     i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
     first, last = float(instants[i]), float(instants[j])
     return float(np.mod(first, period)), float(np.mod(last, period))
@@ -152,9 +154,9 @@ def _best_edges(
     rest = _Rest(fit.effects[position], others, fit.scale, left, across)
     period, half = bench.data.period, 0.5 * bench.data.period / bench.data.samples
     times = [np.mod(each + half, period) - half for each in (firsts, lasts)]
-    instants, gains = _windows(bench, rest, noise, np.unique(np.concatenate(times)))
+    instants, columns = _windows(bench, rest, noise, np.unique(np.concatenate(times)))
     i, j = (np.argmin(np.abs(instants[:, None] - each), axis=0) for each in times)
-    wanted = np.where(i[:, None] == j, -np.inf, gains[i[:, None], j])
+    wanted = np.where(i[:, None] == j, -np.inf, _window_gains(columns, rest.left, i, j))
     a, b = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
     at_an_end = a in (0, len(firsts) - 1) or b in (0, len(lasts) - 1)
     return float(np.mod(firsts[a], period)), float(np.mod(lasts[b], period)), bool(at_an_end)
@@ -182,9 +184,9 @@ class _Rest:
 def _windows(
     bench: Bench, rest: _Rest, noise: NoiseFloor, instants: FloatArray, *, kept: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """Instants (T,) [s] and drop of the statistic (T, T) by the push from one to another, the rest of the model free.
+    """Instants (T,) [s] and whitened columns (M, T, k) of pushes from the beginning of the period to every one.
 
-    A push during any window is the difference of two that begin with the period.
+    A push during any window is the difference of two of these.
 
     Args:
         bench: the recording.
@@ -208,16 +210,20 @@ def _windows(
     scaled = np.asarray(whole * rest.scale[:, None], dtype=np.complex128)
     columns = rest.across(whiten(bench.whitener(noise), scaled)).reshape(-1, count, width)
     # nothing pushes before the first instant
-    columns = np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
-    return instants, _window_gains(columns, rest.left)
+    return instants, np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
 
 
-def _window_gains(columns: FloatArray, left: FloatArray) -> FloatArray:
-    """(T, T) drop of the statistic by a push from one instant to another, where that is earlier round the end.
+def _window_gains(columns: FloatArray, left: FloatArray, begins: IntArray, ends: IntArray) -> FloatArray:
+    """(a, b) drop of the statistic by a push from one instant to another, where that is earlier round the end.
+
+    The rest of the model is free.
 
     Args:
-        columns: (M, T, k) of pushes from the beginning of the period to every instant.
+        columns: (M, T, k) of pushes from the beginning of the period to every instant, what the model takes up left
+            out.
         left: (M,) whitened residual.
+        begins: (a,) which instants a push may begin at.
+        ends: (b,) which it may end at.
     """
     size, count, width = columns.shape
     flat = columns.reshape(size, count * width)
@@ -225,10 +231,11 @@ def _window_gains(columns: FloatArray, left: FloatArray) -> FloatArray:
     score = (left @ flat).reshape(count, width)
     own = gram[np.arange(count), np.arange(count)]
     # from i to j is C_j - C_i, and where j is earlier the whole period comes on top
-    normal = own[None, :] + own[:, None] - _both(gram)
-    along = score[None, :] - score[:, None]
-    round_the_end = np.tril(np.ones((count, count), dtype=bool), -1)
-    wrapped = normal + gram[-1, -1] + _both(gram[None, :, -1] - gram[:, None, -1])
+    i, j = begins[:, None], ends[None, :]
+    normal = own[j] + own[i] - _both(gram[i, j])
+    along = score[j] - score[i]
+    round_the_end = j < i
+    wrapped = normal + gram[-1, -1] + _both(gram[j, -1] - gram[i, -1])
     normal = np.where(round_the_end[:, :, None, None], wrapped, normal)
     along = np.where(round_the_end[:, :, None], along + score[-1], along)
     power = np.sqrt(np.maximum(np.einsum("ijkk->ijk", normal), 0.0))

@@ -32,6 +32,16 @@ def signal_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(effect for effect in effects if is_signal(effect))
 
 
+def moving(signals: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Those effects in the chain of signals that change the motion: what only changes the torque does not."""
+    return tuple(signal for signal in signals if _moves(type(signal)))
+
+
+@cache
+def _moves(kind: type[Effect]) -> bool:
+    return kind.corrected is not Effect.corrected
+
+
 def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
     """Those effects in the chain of signals that change the columns of an effect: what is of one joint sees its own."""
     if not isinstance(effect, JointEffect):

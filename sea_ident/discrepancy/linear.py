@@ -16,6 +16,9 @@ as much as the columns."""
 FAR_FROM_SINGULAR = 1e-6
 """Reciprocal condition number of normalised columns from which on all of them are kept for sure."""
 
+FAR_FROM_LOSS = 1e-3
+"""Reciprocal condition number of normalised columns from which on a basis from their products has ten digits."""
+
 
 def solve(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Least squares with columns that may depend on each other.
@@ -97,14 +100,31 @@ def span(columns: FloatArray) -> FloatArray:
     """(M, r) orthonormal basis of columns (M, p) that may depend on each other."""
     if columns.shape[1] == 0:
         return np.zeros((len(columns), 0))
+    scaled = columns / _norms(columns)
+    made = _by_products(scaled)
+    if made is not None:
+        return made
     basis: FloatArray
-    basis, r = scipy.linalg.qr(columns / _norms(columns), mode="economic", overwrite_a=True, check_finite=False)
+    basis, r = scipy.linalg.qr(scaled, mode="economic", overwrite_a=True, check_finite=False)
     if columns.shape[1] < len(columns) and scipy.linalg.lapack.dtrcon(r)[0] > FAR_FROM_SINGULAR:
         return basis
     # pivots of the small triangle tell the rank as well as its singular values, at a tenth of the price
     turned, r, _ = scipy.linalg.qr(r, mode="economic", pivoting=True, overwrite_a=True, check_finite=False)
     lengths = np.abs(np.diagonal(r))
     return np.asarray(basis @ turned[:, lengths > RANK_TOLERANCE * max(float(lengths[0]), 1e-300)], dtype=np.float64)
+
+
+def _by_products(scaled: FloatArray) -> FloatArray | None:
+    """(M, p) orthonormal basis of normalised columns from their products: half the price of their factorisation.
+
+    The error grows with the square of the condition number; None where that is not small.
+    """
+    if scaled.shape[1] > len(scaled):
+        return None
+    triangle, failed = scipy.linalg.lapack.dpotrf(scaled.T @ scaled, lower=1)
+    if failed or scipy.linalg.lapack.dtrcon(triangle, uplo="L")[0] < FAR_FROM_LOSS:
+        return None
+    return np.asarray(scipy.linalg.solve_triangular(triangle, scaled.T, lower=True, check_finite=False).T)
 
 
 def _norms(columns: FloatArray) -> FloatArray:

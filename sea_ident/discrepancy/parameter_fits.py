@@ -100,10 +100,11 @@ class ParameterFits(Tangents):
         parts = whitening.design(effects)
         whole = self._whole(whitening) if known is None else whitening.in_parts(target[:, :, None]) @ np.ones(1)
         slopes = self.stiffness_slopes(columns, design, effects)
-        values = np.nan_to_num(prior_parameters(self.robot, effects))
         if start is None and noise is not None:
             start = self.fit(effects, None, tangents=False).parameters
-        if start is not None:
+        if start is None:
+            values = np.nan_to_num(prior_parameters(self.robot, effects))
+        else:
             values = np.array([start.get(column.name, 0.0) for column in columns])
         scale = np.ones(len(self.data.equations))
         if noise is None:

@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import successive
 from sea_ident.discrepancy.data import PeriodData, spectrum, towards
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import signal_effects
+from sea_ident.discrepancy.free_shapes import moving, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
 from sea_ident.effects.drift import TrendEffect
@@ -63,16 +63,17 @@ class Periods:
             [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
         )
         model = []
-        for state, body_rows in self._body_rows(signals, tuple(bodies)):
+        values = [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in rest]
+        acting = [(e, each) for e, each in zip(rest, values, strict=True) if len(each)]
+        for state, body_rows in self._body_rows(moving(signals), tuple(bodies)):
             rows = body_rows @ own
             link = rows[:, : self.robot.n].copy()
             motor = rows[:, self.robot.n :].copy()
-            for e in rest:
-                values = np.array([fit.parameters[c.name] for c in e.columns(self.robot)])
-                if len(values):
-                    part = e.evaluate(state)
-                    link += part.link @ values
-                    motor += part.motor @ values
+            for e, each in acting:
+                part = e.evaluate(state)
+                i = slice(None) if part.joint is None else part.joint
+                link[:, i] += part.link[:, i] @ each
+                motor[:, i] += part.motor[:, i] @ each
             part = Contribution(link, motor)
             for signal in signals:
                 part = signal.shifted(self.robot, state.motion.time, part)
@@ -88,7 +89,7 @@ class Periods:
         """
         data, signals = self.data, signal_effects(fit.effects)
         bodies = tuple(e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia"))
-        states = [state for state, _ in self._body_rows(signals, bodies)]
+        states = [state for state, _ in self._body_rows(moving(signals), bodies)]
         torques = [
             data.tau_motor,
             *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor),

@@ -116,7 +116,11 @@ class Selection:
 
 
 def search(
-    bench: Bench, effects: Sequence[Effect], begun: Selection | None = None, ruled_out: Collection[Key] = ()
+    bench: Bench,
+    effects: Sequence[Effect],
+    begun: Selection | None = None,
+    ruled_out: Collection[Key] = (),
+    start: Settled | None = None,
 ) -> Selection:
     """Find the effects that a model lacks.
 
@@ -126,11 +130,12 @@ def search(
         begun: what was found with other samples left out, or before what drifts was known, to go on from; nothing by
             default.
         ruled_out: effects that are not looked for: other data spoke against them.
+        start: the model, settled on this bench, where that was done already.
 
     Returns:
         The model before and after, with what was added.
     """
-    start = settle(bench, effects)
+    start = settle(bench, effects) if start is None else start
     now, added = start, list[float]()
     largest = np.zeros(len(bench.data.equations))
     tried: Tried = {}

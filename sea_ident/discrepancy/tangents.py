@@ -40,6 +40,7 @@ class Tangents(Columns):
     def __init__(self, data: PeriodData) -> None:
         super().__init__(data)
         self._shown: dict[tuple[Effect, ...], dict[int, ComplexArray]] = {}
+        self._stiffness: tuple[Fit, FloatArray] | None = None
         self._derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
     def stiffness_slopes(
@@ -56,6 +57,8 @@ class Tangents(Columns):
 
     def stiffness_of(self, fit: Fit) -> FloatArray:
         """(E,) slope of the springs of a fit over their deflection."""
+        if self._stiffness is not None and self._stiffness[0] is fit:
+            return self._stiffness[1]
         counts, signals = self.counts(fit.effects), signal_effects(fit.effects)
         begins = np.cumsum([0, *counts])
         total = np.zeros(len(self.data.equations))
@@ -64,6 +67,7 @@ class Tangents(Columns):
             if any(column.side is Side.SPRING for column in columns):
                 slopes = self.stiffness_slopes(columns, self.columns_behind(effect, signals), fit.effects)
                 total += slopes @ fit.values[begin : begin + count]
+        self._stiffness = fit, total
         return total
 
     @cached_property

@@ -68,7 +68,7 @@ class ExternalForce(Effect):
     def evaluate(self, state: State) -> Contribution:
         """-J' while it pushes, less in the samples in which it begins and ends: as much as it pushes about them."""
         share = self.share_of(state.motion.time)
-        link = -_jacobians(state, self._body(state.robot), share > 0.0, self._point) * share[:, None, None]
+        link = _jacobians(state, self._body(state.robot), share > 0.0, self._point) * -share[:, None, None]
         return Contribution(link, np.broadcast_to(0.0, link.shape))
 
     def share_of(self, time: FloatArray) -> FloatArray:
@@ -135,13 +135,14 @@ class ExternalForce(Effect):
 
 
 def _jacobians(state: State, body: int, wanted: NDArray[np.bool_], point: FloatArray) -> FloatArray:
-    """(N, n, 3) transposed Jacobians of a point of a body in the link rows, zero where not `wanted` (N,).
+    """(N, n, 3) transposed Jacobians of a point of a body in the link rows, right at least where `wanted` (N,).
 
     The point is given from the centre of mass, in the axes of the body. What does not depend on it is computed once per
-    state.
+    state, and the last point is kept: many pushes that differ by their edges alone are compared there.
     """
     robot, motion = state.robot, state.motion
     kept: dict[int, tuple[NDArray[np.bool_], FloatArray, FloatArray]] = state.__dict__.setdefault("_jacobians", {})
+    last: dict[int, tuple[FloatArray, FloatArray]] = state.__dict__.setdefault("_jacobians_of_point", {})
     nothing = np.zeros(len(motion), dtype=bool), np.zeros((len(motion), robot.n, 6)), np.zeros((len(motion), 3, 3))
     known, rows, turns = kept.setdefault(body, nothing)
     missing = np.flatnonzero(wanted & ~known)
@@ -157,11 +158,14 @@ def _jacobians(state: State, body: int, wanted: NDArray[np.bool_], point: FloatA
             turns[missing[k]] = data.oMi[body].rotation
         rows[missing] = robot.link_map.T @ full.transpose(0, 2, 1)
         known[missing] = True
+        last.pop(body, None)
     moved = rows[:, :, :3]
     if np.any(point):
-        # a point away from the centre moves with the rotation too: v + w x arm
-        moved = moved + np.cross(rows[:, :, 3:], (turns @ point)[:, None])
-    return np.where(wanted[:, None, None], moved, 0.0)
+        if body not in last or not np.array_equal(last[body][0], point):
+            # a point away from the centre moves with the rotation too: v + w x arm
+            last[body] = point, moved + np.cross(rows[:, :, 3:], (turns @ point)[:, None])
+        moved = last[body][1]
+    return moved
 
 
 def _jacobian(robot: Robot, data: pin.Data, body: int, x: FloatArray, point: FloatArray) -> FloatArray:

@@ -30,6 +30,14 @@ class MemoryEffect(JointEffect):
     def advance(self, memory: tuple[float, ...], distance: float) -> tuple[float, ...]:
         """Memory after travelling a distance."""
 
+    def trace(self, memory: tuple[float, ...], steps: FloatArray) -> FloatArray:
+        """(N, m) memory after each of N steps along a path, one after the other."""
+        out = np.empty((len(steps), self.memory_size))
+        for k, distance in enumerate(steps.tolist()):
+            memory = self.advance(memory, distance)
+            out[k] = memory
+        return out
+
     @abstractmethod
     def remembered_columns(self, memory: FloatArray, dtheta: FloatArray) -> FloatArray:
         """(N, k) columns from the memory (N, m) and the motor velocity (N,)."""
@@ -39,20 +47,38 @@ class MemoryEffect(JointEffect):
         path = self.path(q, theta)
         memory: tuple[float, ...] = (0.0,) * self.memory_size
         if is_closed(path):
-            steps = np.diff(path, prepend=path[-1]).tolist()
-            for distance in steps:
-                memory = self.advance(memory, distance)
+            steps = np.diff(path, prepend=path[-1])
+            memory = tuple(self.trace(memory, steps)[-1].tolist())
         else:
-            steps = np.diff(path, prepend=path[0]).tolist()
-        trace = np.empty((len(steps), self.memory_size))
-        for k, distance in enumerate(steps):
-            memory = self.advance(memory, distance)
-            trace[k] = memory
-        return self.remembered_columns(trace, dtheta)
+            steps = np.diff(path, prepend=path[0])
+        return self.remembered_columns(self.trace(memory, steps), dtheta)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """An action that keeps its memory; the simulator tells it by `accept` which states count."""
         return MemoryAction(self, robot.index(self.required_joint), np.asarray(values, dtype=np.float64))
+
+
+class OneWayEffect(MemoryEffect):
+    """An effect whose memory depends only on how far the path went one way, in however many steps.
+
+    So it need only be followed from one reversal of the path to the next.
+    """
+
+    @abstractmethod
+    def advance_all(self, memory: FloatArray, distances: FloatArray) -> FloatArray:
+        """(N, m) memory after travelling distances (N,), each from a memory (N, m) of its own: `advance` for many."""
+
+    def trace(self, memory: tuple[float, ...], steps: FloatArray) -> FloatArray:
+        """(N, m) memory after each of N steps along a path."""
+        begins = np.concatenate([[0], np.flatnonzero(np.diff(steps > 0.0)) + 1])
+        lengths = np.diff(begins, append=len(steps))
+        befores = []
+        for distance in np.add.reduceat(steps, begins).tolist():
+            befores.append(memory)
+            memory = self.advance(memory, distance)
+        travelled = np.cumsum(steps)
+        since = travelled - np.repeat(travelled[begins] - steps[begins], lengths)
+        return self.advance_all(np.repeat(np.array(befores), lengths, axis=0), since)
 
 
 class MemoryAction:

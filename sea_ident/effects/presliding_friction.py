@@ -4,14 +4,16 @@ from dataclasses import dataclass, replace
 from math import exp
 from typing import ClassVar
 
+import numpy as np
+
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Anchor, Column, Shape, Side, smooth_sign
-from sea_ident.effects.memory import MemoryEffect
+from sea_ident.effects.memory import OneWayEffect
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class PreslidingFriction(MemoryEffect):
+class PreslidingFriction(OneWayEffect):
     """c (z - sgn(theta')) at the motor: c sgn(theta') of the Coulomb friction becomes c z where c is the same.
 
     z follows Dahl's law dz/dtheta = (1 - z sgn(theta')) / x_s and takes the place of the sign after a reversal.
@@ -44,6 +46,11 @@ class PreslidingFriction(MemoryEffect):
         if distance > 0.0:
             return (1.0 + (memory[0] - 1.0) * exp(-distance / self.displacement),)
         return (-1.0 + (memory[0] + 1.0) * exp(distance / self.displacement),)
+
+    def advance_all(self, memory: FloatArray, distances: FloatArray) -> FloatArray:
+        """Dahl's law, exact over the distances."""
+        end = np.where(distances > 0.0, 1.0, -1.0)[:, None]
+        return np.asarray(end + (memory - end) * np.exp(-np.abs(distances) / self.displacement)[:, None])
 
     def remembered_columns(self, memory: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Z - sgn(theta')."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column, Shape, Side, State
-from sea_ident.effects.memory import MemoryEffect
+from sea_ident.effects.memory import OneWayEffect
 from sea_ident.effects.spring import deflections
 from sea_ident.robot import Robot
 
@@ -16,7 +16,7 @@ WIDER = 3.0
 
 
 @dataclass(frozen=True)
-class SpringHysteresis(MemoryEffect):
+class SpringHysteresis(OneWayEffect):
     """c_1 z_1 + c_2 z_2 in the spring: two Maxwell-slip elements that slip at w and at 3 w.
 
     An element is a spring in series with dry friction; z goes from -1 to 1.
@@ -68,6 +68,10 @@ class SpringHysteresis(MemoryEffect):
             1.0 if narrow > 1.0 else -1.0 if narrow < -1.0 else narrow,
             1.0 if wide > 1.0 else -1.0 if wide < -1.0 else wide,
         )
+
+    def advance_all(self, memory: FloatArray, distances: FloatArray) -> FloatArray:
+        """Both elements stick until they slip."""
+        return np.clip(memory + distances[:, None] / self.slips, -1.0, 1.0)
 
     def remembered_columns(self, memory: FloatArray, dtheta: FloatArray) -> FloatArray:
         """z_1, z_2."""

@@ -28,12 +28,14 @@ class TorqueDelay(SignalEffect):
     def shifted(self, robot: Robot, time: FloatArray, rows: Contribution) -> Contribution:
         """The rows that give the torque of this motor, ahead of time."""
         i = self.required_index(robot)
+        if rows.joint not in (None, i):
+            return rows
         motor, link = rows.motor.copy(), rows.link
         motor[:, i] = ahead(time, rows.motor[:, i], self.delay)
         if not robot.joints[i].elastic:
             link = rows.link.copy()
             link[:, i] = ahead(time, rows.link[:, i], self.delay)
-        return Contribution(link, motor)
+        return Contribution(link, motor, rows.joint)
 
     def delivered(self, robot: Robot, time: FloatArray, tau_motor: FloatArray) -> FloatArray:
         """The torque when it acted."""

@@ -19,7 +19,13 @@ LOAD_ROUNDS = 3
 """An effect takes a few percent of the load, so that a round leaves a few percent of the error: here of one step."""
 
 LOAD_ROUNDS_EXACT = 60
-"""Until nothing changes any more; for what is recorded."""
+"""Until next to nothing changes any more; for what is recorded."""
+
+NEXT_TO_NOTHING = 1e-14
+"""Change of the loads from one round to the next, as a share of the largest, that is rounding [-]."""
+
+SHRINKING = 0.7
+"""Ratio of two changes in turn up to which a load is taken for the sum of a geometric series [-]."""
 
 
 class ClosedLoop:
@@ -234,12 +240,17 @@ class ClosedLoop:
         if self._bodies is None:
             return
         x, v = self._position(u), self._map.dot(w)
-        for _ in range(rounds):
+        last = before = np.array(self._load)
+        for k in range(rounds):
             acceleration = self._map.dot(self._acceleration(time, elapsed, bias, u, w))
-            load = self._map_t.dot(pin.rnea(self._bodies, self._bodies_data, x, v, acceleration))[: self.n].tolist()
-            if load == self._load:
+            load = self._map_t.dot(pin.rnea(self._bodies, self._bodies_data, x, v, acceleration))[: self.n]
+            self._load = load.tolist()
+            if np.abs(load - last).max() <= NEXT_TO_NOTHING * np.abs(load).max():
                 return
-            self._load = load
+            if k % 3 == 2 and rounds > LOAD_ROUNDS:
+                load = _limit(before, last, load)
+                self._load = load.tolist()
+            before, last = last, load
 
     def _acceleration(self, time: float, elapsed: float, bias: list[float], u: FloatArray, w: FloatArray) -> FloatArray:
         """(size,) accelerations at a trial state."""
@@ -294,3 +305,11 @@ class ClosedLoop:
             f"the mass matrix is not positive at q = {np.round(u[: self.n], 4).tolist()}: the {side} of joint "
             f"{robot.joint_names[i]!r} has the inertia {diagonal[k]:.4g} kg m2; check masses and rotor inertias"
         )
+
+
+def _limit(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
+    """Where series go whose changes shrink by the same factor each time (Aitken); the last of others."""
+    change, next_change = second - first, third - second
+    shrinks = np.abs(next_change) < SHRINKING * np.abs(change)
+    rest = next_change**2 / np.where(shrinks, change - next_change, 1.0)
+    return np.where(shrinks, third + rest, third)

@@ -79,18 +79,18 @@ class Passes:
 
     def _run(self, state: FloatArray, begin: float, *, keep: bool) -> FloatArray:
         system, biases, h, k = self._system, self._biases, self._clock.step, 0
-        for _ in range(self._clock.samples):
-            if keep:
-                self._keep(begin + k * h, k, state)
-            for _ in range(self._clock.substeps):
-                try:
-                    with np.errstate(over="ignore", invalid="ignore"):  # what diverges is told as such
+        with np.errstate(over="ignore", invalid="ignore"):  # what diverges is told as such
+            for _ in range(self._clock.samples):
+                if keep:
+                    self._keep(begin + k * h, k, state)
+                for _ in range(self._clock.substeps):
+                    try:
                         state = system.step(begin + k * h, biases[k], state)
-                except (SimulationError, OverflowError) as error:
-                    raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
-                k += 1
-                system.accept(begin + k * h, state)
-            self._check(state, begin + k * h)
+                    except (SimulationError, OverflowError) as error:
+                        raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
+                    k += 1
+                    system.accept(begin + k * h, state)
+                self._check(state, begin + k * h)
         self.steps += k
         return state
 

@@ -41,7 +41,8 @@ class PlantedTorques:
     def __init__(self, robot: Robot, effects: Sequence[PlantedEffect], begin: float) -> None:
         n = robot.n
         self._begin = begin
-        self._motor = np.array(motor_coordinates(robot), dtype=np.intp)
+        coordinates = motor_coordinates(robot)
+        self._motor, self._sides = np.array(coordinates, dtype=np.intp), list(enumerate(coordinates))
         acting = [p for p in effects if p.effect.side is not Side.SENSOR and overrides(p.effect, "torque")]
         hooks = [(p.effect.side is Side.SPRING, p.effect.torque(robot, p.values)) for p in acting]
         # Springs first: the others may depend on the torque that they transmit.
@@ -55,7 +56,7 @@ class PlantedTorques:
         zeros = [np.zeros(n) for _ in range(6)]
         self._state = SimulationState(0.0, zeros[0], zeros[1], zeros[2], zeros[3], zeros[4], zeros[5])
         self._link, self._torque = np.zeros(n), np.zeros(n)
-        self._out = np.zeros(n + len(robot.elastic_indices))
+        self._size = n + len(robot.elastic_indices)
 
     def _set(
         self,
@@ -76,9 +77,9 @@ class PlantedTorques:
         state.tau_motor[:] = tau_motor
         state.tau_spring[:] = tau_spring
 
-    def _act(self) -> FloatArray:
+    def _act(self) -> list[float]:
         """(size,) torques at the state that is set; springs change its spring torques."""
-        state, link, motor, out = self._state, self._link, self._torque, self._out
+        state, link, motor = self._state, self._link, self._torque
         link[:] = 0.0
         motor[:] = 0.0
         for act in self._springs:
@@ -87,9 +88,10 @@ class PlantedTorques:
             state.tau_spring[:] -= link
         for act in self._others:
             act(state, link, motor)
-        out[:] = 0.0
-        out[: len(link)] = link
-        out[self._motor] += motor
+        out = [0.0] * self._size
+        for (i, m), on_link, on_motor in zip(self._sides, link.tolist(), motor.tolist(), strict=True):
+            out[i] += on_link
+            out[m] += on_motor
         return out
 
     def add(
@@ -104,7 +106,7 @@ class PlantedTorques:
     ) -> None:
         """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
         self._set(time, elapsed, u, w, tau_motor, tau_spring)
-        for i, torque in enumerate(self._act().tolist()):
+        for i, torque in enumerate(self._act()):
             out[i] -= torque
         if self._springs:
             tau_spring[:] = self._state.tau_spring.tolist()
@@ -121,12 +123,12 @@ class PlantedTorques:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
         n = len(self._link)
         self._set(time, 0.0, u, w, tau_motor, tau_spring)
-        base = self._act().tolist()
+        base = self._act()
         for side in (slice(0, n), slice(n, len(u))):
             moved = w.copy()
             moved[side] += np.where(w[side] >= 0.0, SMALL_SPEED, -SMALL_SPEED)
             self._set(time, 0.0, u, moved, tau_motor, tau_spring)
-            changed = self._act().tolist()
+            changed = self._act()
             for k in range(len(u))[side]:
                 slope = (changed[k] - base[k]) / (moved[k] - w[k])
                 if slope > 0.0:

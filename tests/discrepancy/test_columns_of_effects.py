@@ -55,3 +55,12 @@ def test_columns_see_every_signal_that_concerns_them(nothing_missing, name):
         np.testing.assert_allclose(bench.columns_behind(effect, signals), expected, atol=1e-12)
         alone = bench.variant_spectra((effect,), (*bench.effects, *signals))
         np.testing.assert_allclose(alone[1][:, :, 0], expected[:, alone[0]], atol=1e-12)
+
+
+def test_what_only_delays_a_torque_changes_no_motion(laboratory):
+    bench = laboratory.bench(laboratory.record())
+    delays = [make_effect("torque_delay", "knee", delay=delay) for delay in (0.002, 0.003)]
+    states = [bench.state((*bench.effects, delay)) for delay in delays]
+    assert states[0] is states[1] is bench.state(bench.effects)
+    offset = make_effect("encoder_offset", "knee", offset=0.01)
+    assert bench.state((*bench.effects, offset, delays[0])) is not states[0]

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.forward import common_power, noise_power, simulation_gap, spread_of_power
+from sea_ident.discrepancy.forward import SameDrive, common_power, noise_power, simulation_gap, spread_of_power
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify
-from sea_ident.simulation import FrictionJitter, PlantedEffect, SensorNoise, simulate
+from sea_ident.simulation import Controller, FrictionJitter, PlantedEffect, SensorNoise, VelocityController, simulate
+from sea_ident.simulation.reference import PeriodicReference
 
 PERIOD = 5.0
 # without noise there is nothing to compare a residual with, and a model that lacks something says so
@@ -97,3 +98,25 @@ def test_where_a_spring_with_dry_friction_rests_is_no_gap(leg, series):
     assert gap.after["knee"] < 0.2 * gap.before["knee"]
     # at a joint without such a spring it is a gap
     assert gap.after["ankle"] == pytest.approx(5e-4, rel=0.1)
+
+
+class Counting(Controller):
+    """The velocity controller, and how often it was asked."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def drive(self, robot, reference, time):
+        self.asked += 1
+        return VelocityController().drive(robot, reference, time)
+
+
+def test_a_drive_is_worked_out_once_for_the_same_robot_and_times(leg, series):
+    asked, time = Counting(), np.linspace(0.0, 1.0, 20)
+    same, reference = SameDrive(asked), PeriodicReference(series[0])
+    first = same.drive(leg, reference, time)
+    assert same.drive(leg, reference, time.copy()) is first
+    assert asked.asked == 1
+    other = same.drive(leg, reference, time + 0.1)
+    np.testing.assert_array_equal(other.bias, VelocityController().drive(leg, reference, time + 0.1).bias)
+    assert asked.asked == 2

@@ -78,3 +78,11 @@ def test_nothing_spans_nothing():
     nothing = np.zeros((4, 0))
     assert span(nothing).shape == (4, 0)
     assert least_squares(nothing, np.ones(4))[0].shape == (0,)
+
+
+@pytest.mark.parametrize("apart", [1.0, 0.05, 1e-3, 1e-7])
+def test_a_basis_is_orthonormal_however_much_columns_are_alike(apart):
+    columns = RNG.standard_normal((200, 1)) + apart * RNG.standard_normal((200, 8))
+    basis = span(columns * 10.0 ** np.arange(-4, 4))
+    np.testing.assert_allclose(basis.T @ basis, np.eye(8), atol=1e-9)
+    np.testing.assert_allclose(off(basis, columns), 0.0, atol=1e-8)

@@ -52,16 +52,17 @@ def test_spring_effects_are_part_of_the_spring_torque(leg, leg_series, quiet, ex
     np.testing.assert_allclose(run.tau_spring - law, np.tile([2.0, 0.0, 0.0], (len(d), 1)), atol=1e-10)
 
 
-def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet):
+@pytest.mark.parametrize("loaded", [["elbow_joint"], ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint"]])
+def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet, loaded):
     robot = ur10()
-    effect = make_effect("load_dependent_friction", "elbow_joint")
+    effects = [make_effect("load_dependent_friction", joint) for joint in loaded]
     values = np.array([0.1])
     series = modest_series(robot)
-    planted, begin = [PlantedEffect(effect, values)], series.motion(np.zeros(1))
+    planted, begin = [PlantedEffect(effect, values) for effect in effects], series.motion(np.zeros(1))
     run = simulate(robot, series, periods=1, effects=planted, start=begin, **quiet)
     own = base_effects(robot)
-    psi = np.concatenate([np.nan_to_num(plant_from_robot(robot).values_of(own)), values])
-    regressor = build_regressor(robot, (*own, effect), run.motion)
+    psi = np.concatenate([np.nan_to_num(plant_from_robot(robot).values_of(own)), *[values] * len(loaded)])
+    regressor = build_regressor(robot, (*own, *effects), run.motion)
     np.testing.assert_allclose(regressor.sum @ psi, run.tau_motor, atol=1e-9)
     assert not np.any(run.tau_spring)
 
