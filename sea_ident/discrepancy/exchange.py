@@ -73,7 +73,7 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried) -> Settled:
             possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
             gain = reduced.statistic - new.statistic if possible else 0.0
             tried[own, candidate.key] = Outdone(promised, gain / explained)
-            if possible and new.statistic < beat:
+            if possible and new.statistic + penalty(new.effects[position], bench) < better:
                 best = new
         if best is not fit:
             now = settle_again(bench, best)

@@ -217,7 +217,7 @@ def next_effect(
         refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
         if p_value > FAMILY_LEVEL or gain < useful or not _acceptable(bench, fit, new, steps, smallest):
             continue
-        accepted.append((new.statistic + penalty(candidate.effect, bench), new, p_value))
+        accepted.append((new.statistic + penalty(new.effects[-1], bench), new, p_value))
         most, explained = max(most, gain), explained or new.statistic < NEARLY_RIGHT * new.dof
     if not accepted:
         return None
