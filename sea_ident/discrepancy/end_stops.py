@@ -74,7 +74,7 @@ class EndStop(JointEffect):
 
 def end_stops(bench: Bench) -> tuple[EndStop, ...]:
     """A stop at both ends of the path of every joint."""
-    found = []
+    found: list[EndStop] = []
     for i, joint in enumerate(bench.robot.joint_names):
         low, high = (float(end(bench.data.motion.q[:, i])) for end in (np.min, np.max))
         if high > low:
