@@ -249,10 +249,10 @@ def verdict_of(
 
 
 def _known_better(missing: list[MissingEffect], nameless: tuple[Unnamed, ...]) -> bool:
-    """Whether of everything that does not hold on other data it is known what explains both in its place."""
+    """Whether it is known what explains nearly all in the place of everything that does not hold on other data."""
     known = {(each.effect, each.joint) for each in nameless if each.share <= LEAVES}
     weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= TRANSFERS}
-    return bool(weak) and weak <= known
+    return bool(known) and weak <= known
 
 
 def _missing(

@@ -7,7 +7,7 @@ place* fits better by long odds and leaves no more than noise, or hardly anythin
 named one is not what is there. Whether what the named one leaves stands out of noise does not matter.
 
 What pushes in every period may be a law of the position: the end of the range of a joint, which its motion comes to in
-every pass. So a push is held against such ends.
+every pass. So a push is held against such ends, and so is any effect where something is left beside what was found.
 
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
@@ -104,8 +104,11 @@ def unnamed(
     now = selection.final
     pairs = _one_for_two(*(away or (bench, now)), selection, held)
     first, found = len(now.fit.effects) - selection.added, []
+    stops = end_stops(bench)
+    leaves = lack_of_fit(bench, now)[2] < LACK_LEVEL
     for k in range(selection.added):
-        best = _best(bench, now, first + k)
+        may_be_one = leaves or isinstance(now.fit.effects[first + k], ExternalForce)
+        best = _best(bench, now, first + k, stops if may_be_one else ())
         if best is not None and _holds(best, selection, held, k):
             found.append(best)
     return (*pairs, *found)
@@ -162,13 +165,12 @@ def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int
     return rival.holds and rival.statistic < own.statistic
 
 
-def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
+def _best(bench: Bench, now: Settled, position: int, stops: tuple[EndStop, ...]) -> Unnamed | None:
+    """The relative in the place of an effect that explains much more, of its own ones and some ends of the range."""
     fit, noise = now.fit, now.noise
     own = fit.effects[position]
     others = [e for k, e in enumerate(fit.effects) if k != position]
-    family: tuple[Effect, ...] = relatives_of(bench, fit.effects, own)
-    if isinstance(own, ExternalForce):
-        family = end_stops(bench)
+    family: tuple[Effect, ...] = (*relatives_of(bench, fit.effects, own), *stops)
     if not family:
         return None
     reduced = bench.fit(others, noise, start=fit.parameters)
