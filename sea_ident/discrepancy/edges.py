@@ -11,11 +11,11 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.judge import nearly_always, penalty
 from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
-from sea_ident.effects.external_force import POINT, ExternalForce
+from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 
 INSTANTS = 160
 """Instants in a period between which every push is compared."""
@@ -69,8 +69,9 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
     wide = _with(fit, position, *_best_window(bench, fit, noise, position, stride), bench, noise)
     fit = min(fit, wide, key=lambda each: each.statistic)
     # what pushes all the time but then is nearly the same as what pushes then, for a model takes up a constant force
-    start, stop = (getattr(fit.effects[position], name) for name in ("start", "stop"))
-    fit = min(fit, _with(fit, position, stop, start, bench, noise), key=lambda each: each.statistic)
+    start, stop = (getattr(fit.effects[position], name) for name in WHEN)
+    both = fit, _with(fit, position, stop, start, bench, noise)
+    fit = min(both, key=lambda each: (nearly_always(bench, each.effects[position]), each.statistic))
     if stride > 1:
         # a large push leaves much by edges that are a little off, so a window says little of what it may come to
         fit = _sharpened(bench, fit, noise, position, float(stride), 1.0)
@@ -137,7 +138,7 @@ def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, reach: 
     moves: FloatArray = interval * step * np.arange(-round(reach / step), round(reach / step) + 1.0)
     for _ in range(MOST_MOVES):
         push = fit.effects[position]
-        firsts, lasts = (float(getattr(push, name)) + moves for name in ("start", "stop"))
+        firsts, lasts = (float(getattr(push, name)) + moves for name in WHEN)
         start, stop, at_an_end = _best_edges(bench, fit, noise, position, firsts, lasts)
         new = _with(fit, position, start, stop, bench, noise)
         if new.statistic >= fit.statistic:

@@ -119,9 +119,17 @@ def too_short(bench: Bench, effect: Effect) -> bool:
     """
     if not isinstance(effect, ExternalForce):
         return False
-    period = bench.data.period
-    length = float(np.mod(effect.stop - effect.start, period))
-    return length < period / (2.0 * bench.data.harmonics) or length > ALL_THE_TIME * period
+    return _length(bench, effect) < 0.5 / bench.data.harmonics or nearly_always(bench, effect)
+
+
+def nearly_always(bench: Bench, effect: Effect) -> bool:
+    """Whether a push lasts nearly all the time."""
+    return isinstance(effect, ExternalForce) and _length(bench, effect) > ALL_THE_TIME
+
+
+def _length(bench: Bench, push: ExternalForce) -> float:
+    """Share of the period in which it pushes [-]."""
+    return float(np.mod((push.stop - push.start) / bench.data.period, 1.0))
 
 
 def torque_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
