@@ -12,7 +12,7 @@ from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
-from sea_ident.effects.external_force import WHEN, ExternalForce
+from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.stribeck_friction import StribeckFriction
@@ -148,8 +148,9 @@ def penalty(effect: Effect, bench: Bench) -> float:
 
     A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one.
     """
-    # when a push begins and ends is found too, though not by refinement
-    shapes = len(free_shapes((effect,))) + (len(WHEN) if isinstance(effect, ExternalForce) else 0)
+    # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points
+    found = len(effect.shapes) if isinstance(effect, ExternalForce) else 0
+    shapes = found + len(free_shapes((effect,)))
     count = len(effect.columns(bench.robot)) + shapes
     price = count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
     return price + (EQUALLY_GOOD if slowest(effect) else 0.0)
