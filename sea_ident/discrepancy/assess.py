@@ -77,7 +77,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
                 continue
             beat = fit.statistic + enough
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
-            price = fit.unit * (penalty(candidate.effect, bench) - penalty(own, bench))
+            price = fit.unit * (penalty(new.effects[position], bench) - penalty(own, bench))
             if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
                 continue
             if new.statistic - fit.statistic < enough and physical(bench, new, position):

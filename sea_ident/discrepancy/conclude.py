@@ -34,7 +34,7 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import longest_standing
 from sea_ident.discrepancy.trend import Trend, TrendTest
-from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
 from sea_ident.effects.signal import SignalEffect
 
 FEWEST_PERIODS = 10
@@ -57,6 +57,9 @@ GOES = 0.5
 
 STAYS = 0.3
 """... and share of that shrink below which it does not [-]."""
+
+TRANSFERS = 0.5
+"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect."""
 
 UNEXPLAINED = 0.25
 """Share of the excess from which on the effects found are no explanation of it [-]: as large as an effect by itself,
@@ -117,7 +120,8 @@ def conclude(
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
-    if nameless and verdict in (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS):
+    without_doubt = (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS)
+    if nameless and (verdict in without_doubt or (verdict is Verdict.SUSPECT and _known_better(missing, nameless))):
         verdict = Verdict.NOT_IN_LIBRARY
     judged = confirmed.beside or (confirmed.bench, confirmed.final)
     standing = longest_standing(judged[0].data)
@@ -225,7 +229,7 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
-    if not holds or any(m.transfer is not None and m.transfer <= 0.5 for m in structural):
+    if not holds or any(m.transfer is not None and m.transfer <= TRANSFERS for m in structural):
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
@@ -242,6 +246,13 @@ def verdict_of(
     if large or trends.unnamed:
         return Verdict.NAMED_WITH_REMAINDER
     return Verdict.NAMED
+
+
+def _known_better(missing: list[MissingEffect], nameless: tuple[Unnamed, ...]) -> bool:
+    """Whether it is known what explains nearly all in the place of everything that does not hold on other data."""
+    known = {(each.effect, each.joint) for each in nameless if each.share <= LEAVES}
+    weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= TRANSFERS}
+    return bool(known) and weak <= known
 
 
 def _missing(

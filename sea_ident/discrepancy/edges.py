@@ -11,16 +11,20 @@ import numpy as np
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import nearly_always, penalty
 from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
-from sea_ident.effects.external_force import ExternalForce
+from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 
 INSTANTS = 160
 """Instants in a period between which every push is compared."""
 
 FINEST_STEP = 1.0 / 16.0
 """Last step by which edges are moved, in samples."""
+
+BESIDE = 1e-3
+"""Distance from the centre of mass, along every axis of the link, from which its point begins to move [m]."""
 
 POINT_ROUNDS = 4
 """Rounds in which the point of a push and its edges follow each other, ..."""
@@ -32,7 +36,8 @@ MOST_MOVES = 4
 """Times that edges are moved where the best of those within reach is the last of them."""
 
 FAR_ABOVE = 4.0
-"""Times the statistic of interest from which on neither finer edges nor a point make a push the better one."""
+"""Times the statistic of interest from which on, its edges known to the sample and its point as good as it gets, finer
+edges do not make a push the better one."""
 
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
@@ -52,7 +57,7 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
         fit: a model with a push.
         noise: noise floor.
         position: of the push among the effects.
-        beat: statistic that is of interest; what is far above in the best window is left so.
+        beat: statistic that is of interest; what stays far above with any point of the link is left so.
 
     Returns:
         The fit.
@@ -64,12 +69,17 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
     wide = _with(fit, position, *_best_window(bench, fit, noise, position, stride), bench, noise)
     fit = min(fit, wide, key=lambda each: each.statistic)
     # what pushes all the time but then is nearly the same as what pushes then, for a model takes up a constant force
-    start, stop = (getattr(fit.effects[position], name) for name in ("start", "stop"))
-    fit = min(fit, _with(fit, position, stop, start, bench, noise), key=lambda each: each.statistic)
-    if fit.statistic > FAR_ABOVE * beat:
-        return bench.fit(fit.effects, noise, start=fit.parameters)
+    start, stop = (getattr(fit.effects[position], name) for name in WHEN)
+    both = fit, _with(fit, position, stop, start, bench, noise)
+    fit = min(both, key=lambda each: (nearly_always(bench, each.effects[position]), each.statistic))
     if stride > 1:
+        # a large push leaves much by edges that are a little off, so a window says little of what it may come to
         fit = _sharpened(bench, fit, noise, position, float(stride), 1.0)
+    if fit.statistic > FAR_ABOVE * beat:
+        # and a link may be pushed far from its centre of mass
+        fit = _moved_point(bench, fit, noise, position, FAR_ABOVE * beat)
+        if fit.statistic > FAR_ABOVE * beat:
+            return fit
     return _with_point(bench, _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP), noise, position)
 
 
@@ -82,14 +92,41 @@ def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
 
 
 def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
-    """A fit with the point of a push refined, and its edges once more, for these are held where it was wrong."""
+    """A fit with the point of a push refined, and its edges once more, for these are held where it was wrong.
+
+    A point that is not worth the price of its coordinates stays the centre of mass: one on a link farther out, near the
+    axis of its joint, would do the same as a push on this one.
+    """
+    centre = _at_centre(bench, fit, noise, position)
     for _ in range(POINT_ROUNDS):
         before = fit.statistic
-        fit = bench.refine(fit.effects, noise, start=fit.parameters, only=position)
+        fit = _moved_point(bench, fit, noise, position)
         if before - fit.statistic < ENOUGH * fit.excess:
-            return fit
+            break
         fit = _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP)
+    price = penalty(fit.effects[position], bench) - penalty(centre.effects[position], bench)
+    if centre.statistic < fit.statistic + price * fit.unit:
+        fit = centre
     return bench.fit(fit.effects, noise, start=fit.parameters)
+
+
+def _at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A fit with a push on the centre of mass of its link."""
+    push = fit.effects[position]
+    at_centre = replace(push, **dict.fromkeys(POINT, 0.0))  # type: ignore[arg-type]
+    if at_centre == push:
+        return fit
+    effects = [at_centre if k == position else effect for k, effect in enumerate(fit.effects)]
+    centre = bench.fit(effects, noise, start=fit.parameters, tangents=False)
+    return _sharpened(bench, centre, noise, position, 1.0, FINEST_STEP)
+
+
+def _moved_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat: float = np.inf) -> Fit:
+    """A fit with the point of a push where it fits best, from the centre of mass too."""
+    effects, push = list(fit.effects), fit.effects[position]
+    if not any(getattr(push, name) for name in POINT):
+        effects[position] = replace(push, **dict.fromkeys(POINT, BESIDE))  # type: ignore[arg-type]
+    return bench.refine(effects, noise, start=fit.parameters, only=position, beat=beat)
 
 
 def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, reach: float, step: float) -> Fit:
@@ -101,7 +138,7 @@ def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, reach: 
     moves: FloatArray = interval * step * np.arange(-round(reach / step), round(reach / step) + 1.0)
     for _ in range(MOST_MOVES):
         push = fit.effects[position]
-        firsts, lasts = (float(getattr(push, name)) + moves for name in ("start", "stop"))
+        firsts, lasts = (float(getattr(push, name)) + moves for name in WHEN)
         start, stop, at_an_end = _best_edges(bench, fit, noise, position, firsts, lasts)
         new = _with(fit, position, start, stop, bench, noise)
         if new.statistic >= fit.statistic:
@@ -244,7 +281,7 @@ def _window_gains(columns: FloatArray, left: FloatArray, begins: IntArray, ends:
     seen = visible[..., :, None] & visible[..., None, :]
     normal = np.where(seen, normal / (scale[..., :, None] * scale[..., None, :]), 0.0)
     along = np.where(visible, along / scale, 0.0)
-    values = np.einsum("ijkl,ijl->ijk", np.linalg.pinv(normal, rcond=1e-3, hermitian=True), along)
+    values = np.einsum("ijkl,ijl->ijk", np.linalg.pinv(normal, rcond=ABSORBED, hermitian=True), along)
     return np.asarray(np.einsum("ijk,ijk->ij", values, along))
 
 

@@ -78,14 +78,14 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
                 continue
             if last is not None and not last.again(promised):
                 continue
-            dearer = penalty(best.effects[position], bench) - penalty(candidate.effect, bench)
-            beat = best.statistic + fit.unit * (dearer - 1.0)
+            better = best.statistic + fit.unit * (penalty(best.effects[position], bench) - 1.0)
+            beat = better - fit.unit * penalty(candidate.effect, bench)
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
             possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
             gain = reduced.statistic - new.statistic if possible else 0.0
             tried[own, candidate.key] = Outdone(promised, gain / explained)
-            if possible and new.statistic < beat:
+            if possible and new.statistic + fit.unit * penalty(new.effects[position], bench) < better:
                 best = new
         if best is not fit:
             now = settle_again(bench, best)

@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 
 from sea_ident.effects import Effect, JointEffect, Shape
+from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 from sea_ident.effects.signal import SignalEffect
 
 SHAPES_THAT_STAY = {
     "spring_stiffening": ("exponent",),
     "asymmetric_spring": ("kink",),
-    "external_force": ("start", "stop"),
+    "external_force": WHEN,
 }
 """Shape parameters that are not refined: they say which effect it is, or come from elsewhere."""
 
@@ -50,10 +51,15 @@ def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
 
 
 def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
-    """Shape parameters that a fit is free to change, and amounts of signal effects."""
+    """Shape parameters that a fit is free to change, and amounts of signal effects.
+
+    A push on the very centre of mass of a link stays there.
+    """
     found: list[tuple[int, Shape]] = []
     for position, effect in enumerate(effects):
         stay = SHAPES_THAT_STAY.get(effect.name, ())
+        if isinstance(effect, ExternalForce) and not any(getattr(effect, name) for name in POINT):
+            stay = (*stay, *POINT)
         shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
         found.extend((position, shape) for shape in shapes if shape.name not in stay)
     return tuple(found)

@@ -123,9 +123,17 @@ def too_short(bench: Bench, effect: Effect) -> bool:
     """
     if not isinstance(effect, ExternalForce):
         return False
-    period = bench.data.period
-    length = float(np.mod(effect.stop - effect.start, period))
-    return length < period / (2.0 * bench.data.harmonics) or length > ALL_THE_TIME * period
+    return _length(bench, effect) < 0.5 / bench.data.harmonics or nearly_always(bench, effect)
+
+
+def nearly_always(bench: Bench, effect: Effect) -> bool:
+    """Whether a push lasts nearly all the time."""
+    return isinstance(effect, ExternalForce) and _length(bench, effect) > ALL_THE_TIME
+
+
+def _length(bench: Bench, push: ExternalForce) -> float:
+    """Share of the period in which it pushes [-]."""
+    return float(np.mod((push.stop - push.start) / bench.data.period, 1.0))
 
 
 def torque_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
@@ -144,8 +152,9 @@ def penalty(effect: Effect, bench: Bench) -> float:
 
     A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one.
     """
-    # when a push begins and ends is found too, though not by refinement
-    shapes = len(effect.shapes) if isinstance(effect, ExternalForce) else len(free_shapes((effect,)))
+    # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points
+    found = len(effect.shapes) if isinstance(effect, ExternalForce) else 0
+    shapes = found + len(free_shapes((effect,)))
     count = len(effect.columns(bench.robot)) + shapes
     price = count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))
     return price + (EQUALLY_GOOD if slowest(effect) else 0.0)

@@ -6,6 +6,9 @@ friction whose dry part does. So every effect that was found is held against its
 place* fits better by long odds and leaves no more than noise, or hardly anything of what the named effect leaves, the
 named one is not what is there. Whether what the named one leaves stands out of noise does not matter.
 
+What pushes in every period may be a law of the position: the end of the range of a joint, which its motion comes to in
+every pass. So a push is held against such ends, and so is any effect where something is left beside what was found.
+
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
 loss less a torque constant, which is one whose sign turns with the direction. Where one that does all that both do fits
@@ -19,7 +22,8 @@ from itertools import combinations
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import Candidate, scan
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.end_stops import EndStop, end_stops
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
@@ -29,6 +33,7 @@ from sea_ident.discrepancy.relatives import BehindTheSpring, Relative, behind_th
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
+from sea_ident.effects.external_force import ExternalForce
 
 LEAVES = 0.3
 """Share of the excess that a relative may leave of what the named effect leaves to be taken for the truth, unless it
@@ -99,8 +104,11 @@ def unnamed(
     now = selection.final
     pairs = _one_for_two(*(away or (bench, now)), selection, held)
     first, found = len(now.fit.effects) - selection.added, []
+    stops = end_stops(bench)
+    leaves = lack_of_fit(bench, now)[2] < LACK_LEVEL
     for k in range(selection.added):
-        best = _best(bench, now, first + k)
+        may_be_one = leaves or isinstance(now.fit.effects[first + k], ExternalForce)
+        best = _best(bench, now, first + k, stops if may_be_one else ())
         if best is not None and _holds(best, selection, held, k):
             found.append(best)
     return (*pairs, *found)
@@ -135,7 +143,7 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
                 new = bench.refine(new.effects, noise, start=new.parameters)
             if new.statistic - fit.statistic < EQUALLY_GOOD * unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
-                found.append(Unnamed(own.name, own.joint, _in_words(candidate), share, new, second.name))
+                found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new, second.name))
                 break
     return tuple(found)
 
@@ -157,11 +165,12 @@ def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int
     return rival.holds and rival.statistic < own.statistic
 
 
-def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
+def _best(bench: Bench, now: Settled, position: int, stops: tuple[EndStop, ...]) -> Unnamed | None:
+    """The relative in the place of an effect that explains much more, of its own ones and some ends of the range."""
     fit, noise = now.fit, now.noise
     own = fit.effects[position]
     others = [e for k, e in enumerate(fit.effects) if k != position]
-    family = relatives_of(bench, fit.effects, own)
+    family: tuple[Effect, ...] = (*relatives_of(bench, fit.effects, own), *stops)
     if not family:
         return None
     reduced = bench.fit(others, noise, start=fit.parameters)
@@ -182,12 +191,13 @@ def _best(bench: Bench, now: Settled, position: int) -> Unnamed | None:
         if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
             continue
         if best is None or share < best.share:
-            best = Unnamed(own.name, own.joint, _in_words(candidate), share, new)
+            best = Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new)
     return best
 
 
-def _in_words(candidate: Candidate) -> str:
-    relative = candidate.effect
+def _in_words(relative: Effect) -> str:
+    if isinstance(relative, EndStop):
+        return relative.in_words
     if isinstance(relative, BehindTheSpring):
         return f"{relative.name} on the link"
     if isinstance(relative, Relative) and relative.only is not None:

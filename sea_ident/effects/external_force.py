@@ -20,6 +20,12 @@ _BEGINS = 32
 _LENGTHS = (2, 4, 6, 9)
 """Its lengths, in steps between two beginnings."""
 
+WHEN = ("start", "stop")
+"""Shapes that say when it pushes."""
+
+POINT = ("point_x", "point_y", "point_z")
+"""Shapes that say where it meets the link."""
+
 _REACH = 0.5
 """Distance from the centre of mass up to which a link is pushed, along every axis [m]."""
 

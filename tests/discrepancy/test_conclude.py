@@ -12,12 +12,13 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.conclude import _locations, explains, predicts, without_sizes
+from sea_ident.discrepancy.conclude import _known_better, _locations, explains, predicts, without_sizes
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
 from sea_ident.exceptions import SeaIdentWarning
 
@@ -130,3 +131,14 @@ def test_what_only_the_samples_near_reversals_show_has_its_place_there(rippled):
     places = _locations(bench, silent)
     assert (places[0].joint, places[0].equation) == ("hip", "motor")
     assert _locations(bench, replace(silent, selection=replace(silent.selection, added=0))) == ()
+
+
+@pytest.mark.parametrize(
+    ("joint", "share", "transfer", "expected"),
+    [("hip", 1e-3, -3.6, True), ("hip", 1.0, -3.6, False), ("knee", 1e-3, -3.6, False), ("hip", 1e-3, 0.9, True)],
+)
+def test_it_is_no_matter_of_doubt_where_it_is_known_what_holds(rippled, joint, share, transfer, expected):
+    """A push that follows the position comes at another time on another motion."""
+    found = MissingEffect("external_force", "hip", (), 0.02, 0.0, (), transfer=transfer)
+    relative = Unnamed("external_force", joint, "at the same place", share, rippled[1].fit)
+    assert _known_better([found], (relative,)) is expected

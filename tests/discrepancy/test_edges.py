@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import edges
+from sea_ident.discrepancy.assess import rivals
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.decide import simplest_first
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
-from sea_ident.discrepancy.search import search
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import Selection, search
+from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.effects.external_force import POINT
 from sea_ident.simulation import PlantedEffect, simulate
 
 PERIOD = 5.0
@@ -90,3 +95,48 @@ def test_the_best_window_is_the_one_that_fits_best(pushed):
     (start, stop), least = min(every.items(), key=lambda item: item[1])
     assert best == pytest.approx(((start - 0.5) * interval, (stop - 0.5) * interval))
     assert least < 0.5 * now.fit.statistic
+
+
+@pytest.fixture(scope="module")
+def pushed_thigh(laboratory):
+    """A push on the centre of mass of the thigh, and one on the shank in its place."""
+    push = make_effect("external_force", "hip", start=START, stop=STOP, period=PERIOD)
+    bench = laboratory.bench(laboratory.record([(push, np.array([8.0, 0.0, 4.0]))]))
+    now = settle(bench, bench.effects)
+    coarse = {"start": START + 0.05, "stop": STOP - 0.05, "period": PERIOD}
+    candidates = {joint: make_effect("external_force", joint, **coarse) for joint in ("hip", "knee")}
+    fit, noise = now.fit, now.noise
+    shank = refitted(bench, fit.effects, candidates["knee"], (), noise, fit.parameters)
+    noise = bench.noise(shank)
+    shank = bench.fit(shank.effects, noise, start=shank.parameters)
+    return bench, now, Settled(shank, noise), candidates
+
+
+def test_a_push_on_another_link_is_compared_when_its_edges_are_known(pushed_thigh):
+    """A window that is a little off leaves of a large push many times what either link leaves in the end."""
+    bench, now, shank, candidates = pushed_thigh
+    before = shank.fit.effects[: len(now.fit.effects)]
+    begun = bench.fit((*before, candidates["hip"]), shank.noise, start=shank.fit.parameters)
+    assert begun.statistic > 20.0 * shank.fit.statistic
+    beat = shank.fit.statistic + EQUALLY_GOOD
+    thigh = refitted(bench, before, candidates["hip"], (), shank.noise, shank.fit.parameters, beat)
+    assert thigh.statistic < beat
+
+
+def test_a_push_on_a_link_is_not_one_on_the_axis_of_the_next_joint(pushed_thigh):
+    """There it does the same, but at a place that must be found for that."""
+    bench, now, shank, _ = pushed_thigh
+    assert any(getattr(shank.fit.effects[-1], name) for name in POINT)
+    selection = Selection(now, shank, 1, (0.0,))
+    taken, _ = simplest_first(bench, selection, rivals(bench, selection))
+    (push,) = taken.effects
+    assert (push.name, push.joint) == ("external_force", "hip")
+    assert not any(getattr(push, name) for name in POINT)
+
+
+def test_a_push_on_a_centre_of_mass_needs_no_point(pushed):
+    bench, now = pushed
+    effect = make_effect("external_force", "knee", start=START, stop=STOP, period=PERIOD, point_x=0.02, point_z=0.01)
+    begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
+    (*_, push) = with_sharp_edges(bench, begun, now.noise, len(now.fit.effects)).effects
+    assert not any(getattr(push, name) for name in POINT)
