@@ -224,32 +224,30 @@ def _tested(
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
-    confirmed, alternatives, held, ruled_out = _without_the_weak(bench, confirmed, alternatives, held, trends)
-    left = confirmed.selection
-    lacks = bool(left.added and ruled_out) and lack_of_fit(bench, left.final)[2] < LACK_LEVEL
-    if lacks and explains_nearly_all(bench, left.start.fit, left.final):
-        # what spoke for an effect that does not hold is still there, and another one may stand behind it
-        other = confirm(bench, search(bench, bench.effects, left, ruled_out))
-        if other.selection.added > left.added:
-            selection, others = _with_alternatives(bench, other.selection)
-            selection, others, there = decide(bench, selection, others, held.again(selection))
-            other, others, there, _ = _without_the_weak(bench, other.less(selection), others, there, trends)
-            if other.selection.added > left.added:
-                confirmed, alternatives, held = other, others, there
+    searched = False
+    while weak := _out(held, len(trends.trends)):
+        left, ruled_out = (
+            without(bench, confirmed.selection, weak),
+            {effect_key(confirmed.selection.effects[k]) for k in weak},
+        )
+        other = None if searched else _searched_beside(bench, left, ruled_out)
+        searched = True
+        selection, alternatives = _with_alternatives(bench, left if other is None else other.selection)
+        selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
+        confirmed = (other or confirmed).less(selection)
     return confirmed, alternatives, held, notes
 
 
-def _without_the_weak(
-    bench: Bench, confirmed: Confirmed, alternatives: Alternatives, held: HeldOut, trends: TrendTest
-) -> tuple[Confirmed, Alternatives, HeldOut, set[Key]]:
-    """What holds on another motion of what was found, its alternatives there, and what was ruled out."""
-    ruled_out: set[Key] = set()
-    while weak := _out(held, len(trends.trends)):
-        ruled_out |= {effect_key(confirmed.selection.effects[k]) for k in weak}
-        selection, alternatives = _with_alternatives(bench, without(bench, confirmed.selection, weak))
-        selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
-        confirmed = confirmed.less(selection)
-    return confirmed, alternatives, held, ruled_out
+def _searched_beside(bench: Bench, left: Selection, ruled_out: set[Key]) -> Confirmed | None:
+    """What is found beside what is left where the rest was ruled out; None where nothing is, or little was left.
+
+    What spoke for an effect that does not hold is still there, and another one may stand behind it.
+    """
+    lacks = left.added > 0 and lack_of_fit(bench, left.final)[2] < LACK_LEVEL
+    if not lacks or not explains_nearly_all(bench, left.start.fit, left.final):
+        return None
+    found = confirm(bench, search(bench, bench.effects, left, ruled_out))
+    return found if found.selection.added > left.added else None
 
 
 def _out(held: HeldOut, drifting: int) -> list[int]:

@@ -149,5 +149,5 @@ def test_a_shape_that_the_first_motion_leaves_open_is_taken_as_the_other_has_it(
     ],
 )
 def test_where_no_form_is_right_what_leaves_little_more_is_no_worse(statistic, gain, difference):
-    fit = SimpleNamespace(statistic=statistic, dof=600, excess=max(statistic - 600.0, 0.0))
+    fit = SimpleNamespace(statistic=statistic, unit=statistic / 600, excess=max(statistic - 600.0, 0.0))
     assert no_worse(fit, gain) == pytest.approx(difference)

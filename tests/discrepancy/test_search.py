@@ -68,7 +68,7 @@ def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
     """What takes the place of another may come with shapes that are not yet right beside the rest."""
     bench, found = unequal
 
-    def exchanged(bench, now, added, tried):
+    def exchanged(bench, now, added, tried, ruled_out):
         effects = tuple(replace(e, speed=2.0 * e.speed) if hasattr(e, "speed") else e for e in now.fit.effects)
         if effects == now.fit.effects:
             return now
