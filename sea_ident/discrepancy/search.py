@@ -78,6 +78,9 @@ LAST_TWO = 2
 LITTLE_LEFT = 0.02
 """An effect that leaves less than this share of the excess is compared only with what promises more than it, ..."""
 
+AS_MUCH = 0.95
+"""... or about as much as it did, this share at least: a push on the link before it does nearly the same, ..."""
+
 NEARLY_RIGHT = 3.0
 """... once one leaves less than this statistic over degrees of freedom."""
 
@@ -157,10 +160,11 @@ def search(
         added.append(p_value)
         last = now
         now = _settled(bench, settle_again(bench, new))
-        exchanged = exchange(bench, now, len(added), tried, ruled_out)
-        now = now if exchanged is now else _settled(bench, exchanged)
+        # what is tried in the place of a push has its edges where they belong now, and so must the push
         sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
         now = now if sharp is now.fit else settle_again(bench, sharp)
+        exchanged = exchange(bench, now, len(added), tried, ruled_out)
+        now = now if exchanged is now else _settled(bench, exchanged)
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
         if lost and now.fit.excess > SLOW * last.fit.excess:
             break
@@ -211,10 +215,10 @@ def next_effect(
     ]
     accepted: list[tuple[Fit, float]] = []
     steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
-    most, explained = 0.0, False
+    most, promised, explained = 0.0, 0.0, False
     refits: list[tuple[Candidate, float]] = []
     for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
-        if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < most and explained:
+        if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
             continue
         leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]
         # one that explains too little, or less than those that are compared in the end, need not be known exactly
@@ -226,7 +230,9 @@ def next_effect(
         if p_value > FAMILY_LEVEL or gain < useful or not _acceptable(bench, fit, new, steps, smallest):
             continue
         accepted.append((new, p_value))
-        most, explained = max(most, gain), explained or new.statistic < NEARLY_RIGHT * new.dof
+        if gain > most:
+            most, promised = gain, candidate.gain
+        explained = explained or new.statistic < NEARLY_RIGHT * new.dof
     if not accepted:
         return None
     # what is left by the best is left by lack of other effects as well, and small differences are a matter of these

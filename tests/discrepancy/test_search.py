@@ -9,10 +9,12 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
+from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import (
     BESIDE_ANOTHER,
     _acceptable,
     least_useful,
+    next_effect,
     search,
     still_needed,
     visible_changes,
@@ -78,6 +80,36 @@ def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
     again = search(bench, bench.effects)
     assert named(again) == named(found)
     assert again.final.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
+
+
+def test_what_promised_about_as_much_as_what_explains_it_all_is_compared(laboratory, monkeypatch):
+    """Two links that a push moves in nearly the same way promise the same; which was first says nothing."""
+    bench = laboratory.bench(laboratory.record([("torque_offset", "knee", [2.0], {})]))
+    start = settle(bench, bench.effects)
+    found = {(c.effect.name, c.effect.joint): c for c in scan(bench, start.fit, start.noise)}
+    first, others = found["torque_offset", "knee"], [found["torque_constant", "knee"], found["parallel_spring", "knee"]]
+    shares = 0.97, 0.5
+    given = [first, *(replace(c, gain=share * first.gain) for c, share in zip(others, shares, strict=True))]
+    tried = []
+
+    def noted(bench, before, effect, *rest):
+        tried.append(effect.name)
+        return refitted(bench, before, effect, *rest)
+
+    monkeypatch.setitem(next_effect.__globals__, "refitted", noted)
+    fit, _ = next_effect(bench, start, given, 1000, np.full(len(bench.data.equations), 1e-3))
+    assert tried == ["torque_offset", "torque_constant"]
+    assert fit.effects[-1].name == "torque_offset"
+
+
+def test_a_push_has_its_edges_right_before_another_takes_its_place(unequal, monkeypatch):
+    bench, _ = unequal
+    calls = []
+    for name in ("sharpened", "exchange"):
+        plain = search.__globals__[name]
+        monkeypatch.setitem(search.__globals__, name, lambda *a, n=name, f=plain: (calls.append(n), f(*a))[1])
+    added = search(bench, bench.effects).added
+    assert calls == ["sharpened", "exchange"] * added
 
 
 def test_a_search_that_goes_on_from_another_keeps_what_is_needed_and_no_more(unequal):
