@@ -5,7 +5,7 @@ apart is the form: what pushes from outside does so whatever the joint does mean
 goes with it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -32,12 +32,14 @@ class EndStop(JointEffect):
         travel: from there to the other end, with its sign [rad] or [m].
         share: of the travel in which it is pushed back [-].
         exponent: n [-].
+        unit: of the position of the joint, for words.
     """
 
     end: float = 1.0
     travel: float = -1.0
     share: float = 0.3
     exponent: float = 1.0
+    unit: str = "rad"
 
     name: ClassVar[str] = "end_stop"
     side: ClassVar[Side] = Side.LINK
@@ -57,26 +59,23 @@ class EndStop(JointEffect):
         """Shorter and longer ones, of each power."""
         shares = np.geomspace(0.05, 0.7, _SHARES)
         return tuple(
-            EndStop(self.joint, self.end, self.travel, float(share), exponent)
-            for share in shares
-            for exponent in _EXPONENTS
+            replace(self, share=float(share), exponent=exponent) for share in shares for exponent in _EXPONENTS
         )
 
     @property
     def in_words(self) -> str:
         """When it acts."""
-        place, side = self.end + self.share * self.travel, "above" if self.travel < 0.0 else "below"
-        return (
-            f"in every period at the same place and not at a certain time, where {self.joint} is {side} {place:.3g}, "
-            "as a soft stop there does"
-        )
+        side = "above" if self.travel < 0.0 else "below"
+        place = f"{self.joint} is {side} {self.end + self.share * self.travel:.3g} {self.unit}"
+        return f"in every period at the same place and not at a certain time, where {place}, as a soft stop there does"
 
 
 def end_stops(bench: Bench) -> tuple[EndStop, ...]:
     """A stop at both ends of the path of every joint."""
     found: list[EndStop] = []
-    for i, joint in enumerate(bench.robot.joint_names):
+    for i, joint in enumerate(bench.robot.joints):
         low, high = (float(end(bench.data.motion.q[:, i])) for end in (np.min, np.max))
         if high > low:
-            found.extend((EndStop(joint, high, low - high), EndStop(joint, low, high - low)))
+            ends = (high, low - high), (low, high - low)
+            found.extend(EndStop(joint.name, *each, unit=joint.position_unit) for each in ends)
     return tuple(found)

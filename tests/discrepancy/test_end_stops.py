@@ -35,7 +35,7 @@ def test_a_soft_stop_is_no_push(laboratory, nothing_missing, top, exponent):
     assert own.joint == "knee"
     assert own.end + own.share * own.travel == pytest.approx(place, abs=0.03 * float(np.ptp(q)))
     assert f"knee is {'above' if top else 'below'}" in one.sentence
-    assert "at the same place" in one.sentence
+    assert " rad, as a soft stop there does" in one.sentence
 
 
 def test_a_push_while_a_joint_is_at_the_end_of_its_path_is_one(laboratory, nothing_missing):
