@@ -48,6 +48,9 @@ NO_BETTER = 0.5
 """Where an effect explains nearly all and has not the form of what is there, one that leaves no more than this share
 more is no worse [-]."""
 
+TRANSFERS = 0.5
+"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect."""
+
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
 
@@ -170,7 +173,7 @@ class Transfer:
     @property
     def holds(self) -> bool:
         """Whether nothing speaks against it."""
-        return not self.tested or self.share > 0.5
+        return not self.tested or self.share > TRANSFERS
 
 
 def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]:

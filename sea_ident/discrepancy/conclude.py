@@ -58,9 +58,6 @@ GOES = 0.5
 STAYS = 0.3
 """... and share of that shrink below which it does not [-]."""
 
-TRANSFERS = 0.5
-"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect."""
-
 UNEXPLAINED = 0.25
 """Share of the excess from which on the effects found are no explanation of it [-]: as large as an effect by itself,
 half as large in torque as what was there, and nothing of the library does that, ..."""
@@ -229,7 +226,7 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
-    if not holds or any(m.transfer is not None and m.transfer <= TRANSFERS for m in structural):
+    if not holds or any(m.transfer is not None and m.transfer <= assess.TRANSFERS for m in structural):
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
@@ -251,7 +248,7 @@ def verdict_of(
 def _known_better(missing: list[MissingEffect], nameless: tuple[Unnamed, ...]) -> bool:
     """Whether it is known what explains nearly all in the place of everything that does not hold on other data."""
     known = {(each.effect, each.joint) for each in nameless if each.share <= LEAVES}
-    weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= TRANSFERS}
+    weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= assess.TRANSFERS}
     return bool(known) and weak <= known
 
 

@@ -217,6 +217,7 @@ def _tested(
 
     Another motion decides between equals, and what does not hold on it beside what does was the form of the latter, no
     effect of its own. Where nothing holds, the worst is what spoils the others, for each is tried beside all of them.
+    Where something is ruled out beside what holds, what it stood in for is looked for, once.
     """
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
@@ -226,10 +227,8 @@ def _tested(
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     searched = False
     while weak := _out(held, len(trends.trends)):
-        left, ruled_out = (
-            without(bench, confirmed.selection, weak),
-            {effect_key(confirmed.selection.effects[k]) for k in weak},
-        )
+        left = without(bench, confirmed.selection, weak)
+        ruled_out = {effect_key(confirmed.selection.effects[k]) for k in weak}
         other = None if searched else _searched_beside(bench, left, ruled_out)
         searched = True
         selection, alternatives = _with_alternatives(bench, left if other is None else other.selection)

@@ -66,22 +66,24 @@ SEEN = 2.0
 
 @dataclass(frozen=True, eq=False)
 class SameDrive(Controller):
-    """A controller that follows one reference again and again: what is simulated differs, its drive does not.
+    """A controller that follows a reference again and again: what is simulated differs, its drive does not.
 
     Attributes:
         like: the controller.
     """
 
     like: Controller
-    _kept: list[tuple[Robot, FloatArray, Drive]] = field(default_factory=list)
+    _kept: list[tuple[Robot, object, FloatArray, Drive]] = field(default_factory=list)
 
     def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
         """The drive at the times (N,) [s]."""
-        for known, times, drive in self._kept:
-            if known is robot and np.array_equal(times, time):
+        # every simulation wraps the series that it follows anew
+        followed = reference.series if isinstance(reference, PeriodicReference) else reference
+        for known, series, times, drive in self._kept:
+            if known is robot and series is followed and np.array_equal(times, time):
                 return drive
         drive = self.like.drive(robot, reference, time)
-        self._kept.append((robot, time, drive))
+        self._kept.append((robot, followed, time, drive))
         return drive
 
 

@@ -144,8 +144,7 @@ def search(
     tried: Tried = {}
     if begun is not None and begun.added:
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
-        exchanged = exchange(bench, now, len(added), tried, ruled_out)
-        now = now if exchanged is now else _settled(bench, exchanged)
+        now = _improved(bench, now, len(added), tried, ruled_out)
         largest = _largest_changes(bench, now.fit, len(added))
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
@@ -159,12 +158,7 @@ def search(
         largest = np.maximum(largest, visible_changes(bench, now.fit, new))
         added.append(p_value)
         last = now
-        now = _settled(bench, settle_again(bench, new))
-        # what is tried in the place of a push has its edges where they belong now, and so must the push
-        sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
-        now = now if sharp is now.fit else settle_again(bench, sharp)
-        exchanged = exchange(bench, now, len(added), tried, ruled_out)
-        now = now if exchanged is now else _settled(bench, exchanged)
+        now = _improved(bench, _settled(bench, settle_again(bench, new)), len(added), tried, ruled_out)
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
         if lost and now.fit.excess > SLOW * last.fit.excess:
             break
@@ -174,6 +168,22 @@ def search(
             break
     now, added = _eliminate(bench, now, added, tests)
     return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
+
+
+def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key]) -> Settled:
+    """A model whose pushes have their edges where they belong by now, and whose effects gave way to better ones.
+
+    What is tried in the place of a push has sharp edges, and so must the push; what took the place of another effect may
+    move them.
+    """
+    now = _sharp(bench, now)
+    exchanged = exchange(bench, now, added, tried, ruled_out)
+    return now if exchanged is now else _sharp(bench, _settled(bench, exchanged))
+
+
+def _sharp(bench: Bench, now: Settled) -> Settled:
+    sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
+    return now if sharp is now.fit else settle_again(bench, sharp)
 
 
 def _settled(bench: Bench, now: Settled) -> Settled:
@@ -238,19 +248,17 @@ def next_effect(
     # what is left by the best is left by lack of other effects as well, and small differences are a matter of these
     unit = min((new for new, _ in accepted), key=lambda new: new.statistic).unit
     accepted.sort(key=lambda item: item[0].statistic + unit * penalty(item[0].effects[-1], bench))
-    best: tuple[float, Fit, float] | None = None
-    for new, p_value in accepted[:LAST_TWO]:
+
+    def score(new: Fit) -> float:
         whole = bench.refine(new.effects, noise, start=new.parameters) if len(accepted) > 1 else new
-        score = whole.statistic + unit * penalty(new.effects[-1], bench)
-        if best is None or score < best[0]:
-            best = (score, new, p_value)
-    if best is None:
-        return None
-    own, whole_gain = effect_key(best[1].effects[-1]), fit.statistic - best[1].statistic
+        return whole.statistic + unit * penalty(new.effects[-1], bench)
+
+    best, best_p = min(accepted[:LAST_TWO], key=lambda item: score(item[0]))
+    own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
     if tried is not None:
         for candidate, gain in refits:
             tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
-    return best[1], best[2]
+    return best, best_p
 
 
 def least_useful(bench: Bench, now: Settled) -> float:

@@ -131,17 +131,16 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
         others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
-        unit = fit.unit
         for candidate in scan(bench, reduced, noise, family)[:TRIED_FOR_TWO]:
             if candidate.gain < ALL_OF_IT * gain:
                 break
             # the load is that of the model with both: without them it bends
             relative = bench.anchored((*others, candidate.effect), fit.parameters)[-1]
             new = refitted(bench, others, relative, (), noise, fit.parameters)
-            if new.statistic - fit.statistic > EQUALLY_GOOD * unit:
+            if new.statistic - fit.statistic > EQUALLY_GOOD * fit.unit:
                 # the shapes of the model are those beside the two
                 new = bench.refine(new.effects, noise, start=new.parameters)
-            if new.statistic - fit.statistic < EQUALLY_GOOD * unit and _transfers(new, selection, held):
+            if new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
                 found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new, second.name))
                 break
@@ -184,9 +183,8 @@ def _best(bench: Bench, now: Settled, position: int, stops: tuple[EndStop, ...])
         if new.excess > LEAVES * fit.excess:
             # the shapes of the model are those beside the named effect
             new = bench.refine(new.effects, noise, start=new.parameters)
-        unit = new.unit
         share = new.excess / max(fit.excess, 1.0)
-        if fit.statistic - new.statistic < better * unit:
+        if fit.statistic - new.statistic < better * new.unit:
             continue
         if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
             continue

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy.assess import Transfer
@@ -9,12 +10,13 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.decide import _better, decide, simplest_first
-from sea_ident.discrepancy.diagnose import _tested
+from sea_ident.discrepancy.diagnose import _searched_beside, _tested
+from sea_ident.discrepancy.exchange import exchange
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import Kind, tried
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.search import Selection, next_effect
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.effects import make_effect
@@ -113,20 +115,50 @@ def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_tur
     assert left == {first: (), first + 1: ()}
 
 
-def test_what_another_effect_leaves_speaks_for_no_wave(laboratory):
-    """Beside a tilted base that is not known yet a wave takes up a little more than the constant that it stands for."""
+@pytest.fixture(scope="module")
+def constant_or_wave(laboratory):
+    """A constant torque, and a wave in its place that takes up a little of what a tilted base leaves."""
     planted = [("torque_offset", JOINT, [2.0], {}), ("base_tilt", None, [0.0, -0.05], {})]
     bench = laboratory.bench(laboratory.record(planted))
-    start, position = settle(bench, bench.effects), len(bench.effects)
+    start = settle(bench, bench.effects)
     effects = make_effect("torque_offset", JOINT), make_effect("torque_ripple", JOINT, order=2.0)
     constant, wave = (
         refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters) for effect in effects
     )
     dearer = penalty(wave.effects[-1], bench) - penalty(effects[0], bench)
     assert dearer < constant.statistic - wave.statistic < wave.unit * dearer
+    return bench, start, constant, wave
+
+
+def test_what_another_effect_leaves_speaks_for_no_wave(constant_or_wave):
+    bench, start, constant, wave = constant_or_wave
     selection = Selection(start, Settled(wave, start.noise), 1, (1e-9,))
-    listed = {position: (Alternative("torque_offset", JOINT, 1.0, constant),)}
+    listed = {len(bench.effects): (Alternative("torque_offset", JOINT, 1.0, constant),)}
     assert simplest_first(bench, selection, listed)[0].effects[0].name == "torque_offset"
+
+
+@pytest.mark.parametrize("first", ["torque_offset", "torque_ripple"])
+def test_nor_in_a_search_whichever_is_tried_first(constant_or_wave, first):
+    bench, start, *_ = constant_or_wave
+    found = [c for c in scan(bench, start.fit, start.noise) if c.effect.joint == JOINT]
+    pair = [c for c in found if c.effect.name in ("torque_offset", "torque_ripple")]
+    pair.sort(key=lambda c: c.effect.name != first)
+    fit, _ = next_effect(bench, start, pair, 1000, np.full(len(bench.data.equations), 1e-3))
+    assert fit.effects[-1].name == "torque_offset"
+
+
+def test_nor_in_an_exchange(constant_or_wave):
+    bench, start, _, wave = constant_or_wave
+    everything = {c.key for c in scan(bench, start.fit, start.noise)}
+    ruled_out = everything - {("torque_offset", JOINT, "")}
+    after = exchange(bench, Settled(wave, start.noise), 1, {}, ruled_out)
+    assert after.fit.effects[-1].name == "torque_offset"
+
+
+def test_what_is_ruled_out_takes_the_place_of_nothing(constant_or_wave):
+    bench, start, _, wave = constant_or_wave
+    now = Settled(wave, start.noise)
+    assert exchange(bench, now, 1, {}, {c.key for c in scan(bench, start.fit, start.noise)}) is now
 
 
 def test_what_is_in_the_model_is_no_alternative_to_another_part_of_it(rivals):
@@ -161,6 +193,18 @@ def test_what_is_ruled_out_makes_room_for_what_it_stood_in_for(laboratory):
     assert named == {("torque_ripple", "hip"), ("load_dependent_friction", JOINT)}
     assert all(transfer.holds for transfer in held.transfers)
     assert now.final.fit.statistic < 1.2 * now.final.fit.dof
+
+
+def test_where_little_holds_nothing_is_searched_beside_it(laboratory, monkeypatch):
+    """A library that lacks what is there has always something else to offer."""
+    planted = [("torque_ripple", "hip", [0.3, 0.1], {"order": 4.0}), ("load_dependent_friction", JOINT, [0.15], {})]
+    bench = laboratory.bench(laboratory.record(planted))
+    start = settle(bench, bench.effects)
+    ripple = make_effect("torque_ripple", "hip", order=4.0)
+    fit = refitted(bench, start.fit.effects, ripple, (), start.noise, start.fit.parameters)
+    monkeypatch.setitem(_searched_beside.__globals__, "search", lambda *_: pytest.fail("searched"))
+    assert _searched_beside(bench, Selection(start, Settled(fit, start.noise), 1, (1e-9,)), set()) is None
+    assert _searched_beside(bench, Selection(start, start, 0, ()), set()) is None
 
 
 def test_what_neither_explains_leans_to_none():

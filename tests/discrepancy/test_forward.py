@@ -111,12 +111,13 @@ class Counting(Controller):
         return VelocityController().drive(robot, reference, time)
 
 
-def test_a_drive_is_worked_out_once_for_the_same_robot_and_times(leg, series):
+def test_a_drive_is_worked_out_once_for_the_same_robot_reference_and_times(leg, series):
     asked, time = Counting(), np.linspace(0.0, 1.0, 20)
     same, reference = SameDrive(asked), PeriodicReference(series[0])
     first = same.drive(leg, reference, time)
-    assert same.drive(leg, reference, time.copy()) is first
+    assert same.drive(leg, PeriodicReference(series[0]), time.copy()) is first
     assert asked.asked == 1
-    other = same.drive(leg, reference, time + 0.1)
-    np.testing.assert_array_equal(other.bias, VelocityController().drive(leg, reference, time + 0.1).bias)
-    assert asked.asked == 2
+    for other, times in ((reference, time + 0.1), (PeriodicReference(series[1]), time)):
+        drive = same.drive(leg, other, times)
+        np.testing.assert_array_equal(drive.bias, VelocityController().drive(leg, other, times).bias)
+    assert asked.asked == 3

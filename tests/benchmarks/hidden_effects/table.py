@@ -127,7 +127,9 @@ def lines_of(scores: list[Score]) -> list[Line]:
         add(_number(row, "forward simulation of q, shrink, median", ">= 0.9", (s.shrink_simulation for s in right),
                     lambda x: x >= 0.9))  # fmt: skip
     for robot, limit in LONGEST.items():
-        _seconds(robot, limit, [s.seconds for s in scores if s.case.robot == robot and math.isfinite(s.seconds)], add)
+        timed = [s for s in scores if s.case.robot == robot and math.isfinite(s.seconds)]
+        _seconds(robot, limit, [s.seconds for s in timed], add)
+        _seconds(f"{robot}, missing", limit, [s.seconds for s in timed if s.case.row != "none"], add)
     errors = [s for s in scores if s.verdict == "error"]
     add(_share("all", "errors", "0", (s.verdict == "error" for s in scores), lambda x: not errors))
     return lines
