@@ -173,8 +173,8 @@ def search(
 def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key]) -> Settled:
     """A model whose pushes have their edges where they belong by now, and whose effects gave way to better ones.
 
-    What is tried in the place of a push has sharp edges, and so must the push; what took the place of another effect may
-    move them.
+    What is tried in the place of a push has sharp edges, and so must the push; what took the place of another effect
+    may move them.
     """
     now = _sharp(bench, now)
     exchanged = exchange(bench, now, added, tried, ruled_out)
