@@ -109,7 +109,7 @@ def spread(steps: FloatArray, change: FloatArray) -> float:
 def at_a_bound(effect: Effect) -> bool:
     """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else."""
     for shape in effect.shapes:
-        if shape.logarithmic and shape.name not in ("smoothing", "order", "time_constant"):
+        if shape.logarithmic and shape.name not in ("smoothing", "softness", "order", "time_constant"):
             value = float(getattr(effect, shape.name))
             if value < 1.02 * shape.lower or value > 0.98 * shape.upper:
                 return True

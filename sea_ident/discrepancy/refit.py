@@ -25,6 +25,12 @@ LARGE_AMOUNT = 0.1
 SMALLER = 0.1
 """... with this part of it too [-]."""
 
+SOFTER = (0.25, 0.5, 1.0, 1.4)
+"""Softness of the ends of a play of which the best is a beginning too [-]: hard ends do not show how soft ones do."""
+
+IN_SERIES = 4
+"""Steps in which the width of such a play makes it one in series with its spring."""
+
 MOST_LAWS = 4
 """Rounds in which an effect in a spring follows the law of the spring, and the law the effect."""
 
@@ -65,13 +71,16 @@ def refitted(
     if isinstance(effect, SignalEffect) and effect.beginnings:
         first = effect.amounts[0].name
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
+    if isinstance(effect, Backlash):
+        begun.append(_softened(bench, before, effect, after, noise, start))
     if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
         smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
         begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
     fits: list[Fit] = []
     for each in begun:
         model = (*before, each, *after)
-        if fits and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
+        amount = fits and isinstance(each, SignalEffect)
+        if amount and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
             continue
         if isinstance(each, ExternalForce):
             fits.append(bench.fit(model, noise, start=start))
@@ -104,6 +113,34 @@ def _in_its_spring(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, bea
         if abs(last.statistic - fit.statistic) < EQUALLY_GOOD or fit.statistic > FAR_ABOVE * beat:
             break
     return fit
+
+
+def _softened(
+    bench: Bench,
+    before: Sequence[Effect],
+    effect: Backlash,
+    after: Sequence[Effect],
+    noise: NoiseFloor,
+    start: Mapping[str, float],
+) -> Backlash:
+    """Play with soft ends that does best of some, as wide as makes its stiffness that of the spring it is in.
+
+    Width, softness and stiffness make up for each other along a valley, which a fit of all of them would go along in
+    small steps.
+    """
+    best, least = effect, np.inf
+    for softness in SOFTER:
+        play = replace(effect, softness=softness)
+        for _ in range(IN_SERIES):
+            fit = bench.fit((*before, play, *after), noise, start=start, tangents=False)
+            own = fit.parameters[play.parameter_name()]
+            stiffness = fit.parameters.get(f"{play.joint}.spring_stiffness", 0.0)
+            if not (own > 0.0 and stiffness > 0.0):
+                break
+            if fit.statistic < least:
+                best, least = play, fit.statistic
+            play = replace(play, half_width=play.half_width * own / stiffness)
+    return best
 
 
 def _never_closed(bench: Bench, effect: Effect, fit: Fit) -> Effect:

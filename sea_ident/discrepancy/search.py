@@ -70,7 +70,10 @@ MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
 FINALISTS = 4
-"""Candidates that are refitted with everything free before one is accepted, and the best of every kind beside them."""
+"""Candidates that are refitted with everything free before one is accepted, and the best of every kind beside them: ..."""
+
+MOST_FINALISTS = 7
+"""... up to so many where they promise about as much as the best of them."""
 
 LAST_TWO = 2
 """Of these the best are compared with the shapes of the model refined too."""
@@ -227,7 +230,8 @@ def next_effect(
     steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
     most, promised, explained = 0.0, 0.0, False
     refits: list[tuple[Candidate, float]] = []
-    for candidate in of_every_kind(worth, FINALISTS, worth[0].effect.joint if worth else None):
+    as_good = sum(c.gain > AS_MUCH * worth[0].gain for c in worth[:MOST_FINALISTS])
+    for candidate in of_every_kind(worth, max(FINALISTS, as_good), worth[0].effect.joint if worth else None):
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
             continue
         leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]

@@ -16,26 +16,39 @@ LARGEST_STEP = 2.0
 """Factor between two widths that a search tries: where the play is never closed, K follows from the width, and what is
 between the spring's own stiffness and its double must not be stepped over."""
 
+SOFT = 0.5
+"""Softness of the ends of a play that a search tries beside `NEARLY_HARD` ones, of every third width [-]."""
+
+NEARLY_HARD = 0.05
+"""Softness from which a search begins that of play with ends that can be told apart from hard ones by no motion [-]."""
+
 
 @dataclass(frozen=True)
 class Backlash(SpringEffect):
     """-K (c + r (d^3 - (d - c)^3)), d = theta - q, c = clip(d, -w, w): within the play the spring carries nothing.
 
     With K the stiffness of the spring and r its cubic stiffness over K, what is left is the torque of the spring at
-    d - c. K is fitted on its own.
+    d - c. K is fitted on its own. Teeth, cables and padding do not take hold at once: soft ends are met with a
+    probability that grows over the deflections +-w +-s w, so c is the mean of the clip with a logistic spread, which is
+    s w / 2 log(cosh((d + w) / s w) / cosh((d - w) / s w)).
 
     Attributes:
         joint: joint at which it acts.
         half_width: w [rad] or [m].
+        softness: s of its ends, none by default [-].
         cubic: r of the spring that the play is in series with [1/rad2] or [1/m2].
     """
 
     half_width: float = 0.003
+    softness: float = 0.0
     cubic: float = 0.0
 
     name: ClassVar[str] = "backlash"
     source: ClassVar[str] = "Nordin, Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("half_width", "rad", 1e-5, 0.5),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("half_width", "rad", 1e-5, 0.5),
+        Shape("softness", "-", 0.01, 1.5),
+    )
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
@@ -57,7 +70,9 @@ class Backlash(SpringEffect):
             for low, high in pairwise(widths)
             for width in np.geomspace(low, high, int(np.ceil(np.log(high / low) / np.log(LARGEST_STEP))) + 1)[1:-1]
         ]
-        return tuple(replace(self, half_width=width) for width in sorted((*widths, *between)))
+        every = sorted((*widths, *between))
+        hard = (replace(self, half_width=width, softness=NEARLY_HARD) for width in every)
+        return (*hard, *(replace(self, half_width=width, softness=SOFT) for width in every[::3]))
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
         """Whether K is about the stiffness of the spring that the play is in series with."""
@@ -67,5 +82,15 @@ class Backlash(SpringEffect):
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """-(c + r (d^3 - (d - c)^3))."""
         d = theta - q
-        c = np.clip(d, -self.half_width, self.half_width)
+        c = self._taken_up(d)
         return -(c + self.cubic * (d**3 - (d - c) ** 3))[:, None]
+
+    def _taken_up(self, deflection: FloatArray) -> FloatArray:
+        """(N,) part of deflections (N,) that the play takes up."""
+        w = self.half_width
+        taken = np.clip(deflection, -w, w)
+        if self.softness > 0.0:
+            spread = self.softness * w
+            ends = (np.log1p(np.exp(-2.0 * np.abs(deflection - side) / spread)) for side in (-w, w))
+            taken = taken + 0.5 * spread * (next(ends) - next(ends))
+        return np.asarray(taken, dtype=np.float64)
