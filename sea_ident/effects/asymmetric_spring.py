@@ -14,6 +14,10 @@ from sea_ident.robot import Robot
 KINKS = (-0.3, -0.15, 0.15, 0.3)
 """Places of a kink that a search tries beside none, as shares of the largest deflection of the motion [-]."""
 
+BEFORE_IT = 0.9
+"""Where the motion deflects to one side only: place of a kink that it just does not reach, and of one as far to the
+other side, as a share of its least deflection [-]. The sides differ least there for the same torque on the motion."""
+
 
 @dataclass(frozen=True)
 class AsymmetricSpring(SpringEffect):
@@ -48,7 +52,10 @@ class AsymmetricSpring(SpringEffect):
         """
         deflection = state.motion.deflection[:, state.robot.index(self.required_joint)]
         low, high = float(deflection.min()), float(deflection.max())
-        kinks = (share * max(-low, high) for share in KINKS)
+        kinks = [share * max(-low, high) for share in KINKS]
+        if low * high > 0.0:
+            nearest = BEFORE_IT * min(abs(low), abs(high))
+            kinks.extend((-nearest, nearest))
         exponents = (float(exponent) for exponent in self.shapes[0].grid())
         return (
             *(replace(self, exponent=exponent, kink=0.0) for exponent in exponents),

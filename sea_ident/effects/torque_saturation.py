@@ -1,5 +1,6 @@
 """Torque that falls behind the current when the motor is overloaded."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import Anchor, Column, Contribution, Side, State
+from sea_ident.effects.base import Anchor, Column, Contribution, Shape, Side, State
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
 
@@ -17,45 +18,61 @@ _STEPS = 12
 
 @dataclass(frozen=True)
 class TorqueSaturation(LoadEffect):
-    """C u^3 in the motor row, u being the commanded torque: what saturation takes away from it.
+    """C sgn(u) |u|^p in the motor row, u being the commanded torque: what saturation takes away from it.
 
     Attributes:
-        coefficient: c of the model, by which u follows from the torque that the motor gives: u - c u^3 = tau_m.
+        exponent: p, a cube by default [-].
+        coefficient: c of the model, by which u follows from the torque that the motor gives: u - c u^p = tau_m.
+        found_with: the p that belongs to this c [-].
     """
 
+    exponent: float = 3.0
     coefficient: float = 0.0
+    found_with: float = 3.0
 
     name: ClassVar[str] = "torque_saturation"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Vantilt et al., ICRA 2015, on eq. 6"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "-", 1.5, 9.0, points=1),)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
         unit = robot.joints[robot.index(self.at)].torque_unit
-        return (Column(self.parameter_name(), f"1/({unit})^2", self.name, self.joint, self.side, True),)
+        power = f"{self.exponent - 1.0:.3g}"
+        return (Column(self.parameter_name(), f"1/({unit})^{power}", self.name, self.joint, self.side, True),)
+
+    def variants(self, state: State) -> tuple["TorqueSaturation", ...]:
+        """The cube: other powers are nearly the same, and found from there."""
+        return (self,)
 
     def anchored(self, anchor: Anchor) -> "TorqueSaturation":
         """With the load and the saturation of the model."""
         loaded = super().anchored(anchor)
-        return replace(loaded, coefficient=max(anchor.value(self.parameter_name()), 0.0))
+        coefficient = max(anchor.value(self.parameter_name()), 0.0)
+        return replace(loaded, coefficient=coefficient, found_with=self.exponent)
 
     def evaluate(self, state: State) -> Contribution:
-        """Cube of the commanded torque."""
-        torque = self.motor_torque(state)
+        """Power of the commanded torque."""
+        torque, p = self.motor_torque(state), self.exponent
         command = torque
         if self.coefficient > 0.0:
-            largest = 1.0 / np.sqrt(3.0 * self.coefficient)
+            # what is taken away stays about the same with another exponent
+            typical = float(np.sqrt(np.mean(torque**2)))
+            coefficient = self.coefficient * typical ** (self.found_with - p)
+            largest = (p * coefficient) ** (-1.0 / (p - 1.0))
             for _ in range(_STEPS):
-                error = command - self.coefficient * command**3 - torque
-                slope = np.maximum(1.0 - 3.0 * self.coefficient * command**2, 0.1)
+                size = np.abs(command)
+                error = command - coefficient * np.sign(command) * size**p - torque
+                slope = np.maximum(1.0 - p * coefficient * size ** (p - 1.0), 0.1)
                 command = np.clip(command - error / slope, -largest, largest)
-        return state.at(self.side, self.at, command[:, None] ** 3)
+        return state.at(self.side, self.at, (np.sign(command) * np.abs(command) ** p)[:, None])
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
-        """The cube of the commanded torque."""
-        i = robot.index(self.at)
+        """The power of the commanded torque."""
+        i, p = robot.index(self.at), self.exponent
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            motor[i] += float(values[0] * state.tau_motor[i] ** 3)
+            command = float(state.tau_motor[i])
+            motor[i] += float(values[0]) * math.copysign(abs(command) ** p, command)
 
         return act
