@@ -75,7 +75,7 @@ MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
 FINALISTS = 4
-"""Candidates that are refitted with everything free before one is accepted, with the best of every kind beside them ..."""
+"""Candidates that are refitted with everything free before one is accepted, and the best of every kind too, ..."""
 
 MOST_FINALISTS = 7
 """... and up to so many where they promise about as much as the best of them."""
