@@ -4,6 +4,7 @@ Every module of this package that defines an `Effect` with a name is found by it
 entry point of the group ``sea_ident.effects`` that names the class.
 """
 
+import math
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module, metadata
@@ -88,15 +89,24 @@ def make_effect(name: str, joint: str | None = None, **shape: Any) -> Effect:
         The effect.
 
     Raises:
-        EffectError: if there is no such effect or shape parameter.
+        EffectError: if there is no such effect or shape parameter, or its value is none that it can have.
     """
     classes = effect_classes()
     if name not in classes:
         raise EffectError(f"no effect is named {name!r}; known effects: {', '.join(sorted(classes))}")
     try:
-        return classes[name](joint=joint, **shape)
+        effect = classes[name](joint=joint, **shape)
     except TypeError as error:
         raise EffectError(f"effect {name!r}: {error}") from None
+    for known in effect.shapes:
+        value = float(getattr(effect, known.name))
+        if not math.isfinite(value) or (known.logarithmic and value <= 0.0):
+            expected = "a positive number" if known.logarithmic else "a finite number"
+            raise EffectError(
+                f"effect {name!r} at {joint!r}: {known.name} = {value:g} {known.unit} is not {expected}; usual are "
+                f"{known.lower:g} to {known.upper:g} {known.unit}"
+            )
+    return effect
 
 
 def effect_from_dict(record: Mapping[str, Any]) -> Effect:

@@ -20,7 +20,7 @@ SOFT = 0.5
 """Softness of the ends of a play that a search tries beside `NEARLY_HARD` ones, of every third width [-]."""
 
 NEARLY_HARD = 0.05
-"""Softness from which a search begins that of play with ends that can be told apart from hard ones by no motion [-]."""
+"""Softness of ends that hardly a motion tells apart from hard ones, from which a search begins [-]."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Backlash(SpringEffect):
     Attributes:
         joint: joint at which it acts.
         half_width: w [rad] or [m].
-        softness: s of its ends, none by default [-].
+        softness: s of its ends, which is nothing for hard ones; these are nearly hard [-].
         cubic: r of the spring that the play is in series with [1/rad2] or [1/m2].
     """
 
     half_width: float = 0.003
-    softness: float = 0.0
+    softness: float = NEARLY_HARD
     cubic: float = 0.0
 
     name: ClassVar[str] = "backlash"
@@ -71,7 +71,7 @@ class Backlash(SpringEffect):
             for width in np.geomspace(low, high, int(np.ceil(np.log(high / low) / np.log(LARGEST_STEP))) + 1)[1:-1]
         ]
         every = sorted((*widths, *between))
-        hard = (replace(self, half_width=width, softness=NEARLY_HARD) for width in every)
+        hard = (replace(self, half_width=width) for width in every)
         return (*hard, *(replace(self, half_width=width, softness=SOFT) for width in every[::3]))
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
@@ -87,10 +87,6 @@ class Backlash(SpringEffect):
 
     def _taken_up(self, deflection: FloatArray) -> FloatArray:
         """(N,) part of deflections (N,) that the play takes up."""
-        w = self.half_width
-        taken = np.clip(deflection, -w, w)
-        if self.softness > 0.0:
-            spread = self.softness * w
-            ends = (np.log1p(np.exp(-2.0 * np.abs(deflection - side) / spread)) for side in (-w, w))
-            taken = taken + 0.5 * spread * (next(ends) - next(ends))
-        return np.asarray(taken, dtype=np.float64)
+        w, spread = self.half_width, self.softness * self.half_width
+        low, high = (np.log1p(np.exp(-2.0 * np.abs(deflection - end) / spread)) for end in (-w, w))
+        return np.asarray(np.clip(deflection, -w, w) + 0.5 * spread * (low - high), dtype=np.float64)

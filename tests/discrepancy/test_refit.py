@@ -5,7 +5,7 @@ import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.judge import physical
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
@@ -84,3 +84,31 @@ def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(labor
     found = refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters)
     assert physical(bench, found, -1)
     assert found.effects[-1].half_width == pytest.approx(width, rel=0.1)
+
+
+def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing):
+    """Where the motion does not pass the play its softness is all that tells it from a constant."""
+    bench, _ = nothing_missing
+    deflection = bench.data.motion.deflection
+    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
+    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    spring = bench.robot.spring(name)
+    shapes = {"half_width": 0.8 * least, "softness": 0.8, "cubic": spring.cubic_stiffness / spring.stiffness}
+    bench = laboratory.bench(laboratory.record([("backlash", name, [spring.stiffness], shapes)], periods=6))
+    start = settle(bench, bench.effects)
+    now = settle(bench, (*bench.effects, make_effect("backlash", name, **shapes)))
+    constant, hard, soft = (
+        refitted(bench, start.fit.effects, effect, (), now.noise, start.fit.parameters)
+        for effect in (
+            make_effect("spring_offset", name),
+            make_effect("backlash", name, half_width=0.8 * least, softness=0.01),
+            make_effect("backlash", name, half_width=0.5 * least),
+        )
+    )
+    assert soft.statistic == pytest.approx(hard.statistic, rel=0.05)
+    assert soft.statistic < 1.2 * soft.dof
+    assert constant.statistic > soft.statistic + 10.0 * EQUALLY_GOOD
+    widths, softness = (len(soft.columns) + k for k in (len(soft.free_shapes) - 2, len(soft.free_shapes) - 1))
+    found = soft.effects[-1]
+    assert np.log(found.half_width / shapes["half_width"]) == pytest.approx(0.0, abs=3.0 * soft.std(widths))
+    assert np.log(found.softness / shapes["softness"]) == pytest.approx(0.0, abs=3.0 * soft.std(softness))

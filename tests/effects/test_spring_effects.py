@@ -4,6 +4,8 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from scipy import stats
 
 from sea_ident.base_parameters import random_motion
 from sea_ident.effects import Anchor, State, make_effect, spring_effects
@@ -41,8 +43,11 @@ def test_widths_of_play_that_a_search_tries_leave_no_gap_where_the_deflection_ke
     # from 20 to 30 mrad: play below 20 never closes, and only its stiffness times its width shows
     theta = motion.q + 0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None]
     one_way = replace(motion, theta=theta)
-    widths = [v.half_width for v in make_effect("backlash", "knee").variants(State(leg, one_way))]
+    plays = make_effect("backlash", "knee").variants(State(leg, one_way))
+    softest = max(play.softness for play in plays)
+    widths = [play.half_width for play in plays if play.softness < softest]
     assert np.all(np.diff(widths) > 0.0)
+    assert {play.half_width for play in plays if play.softness == softest} < set(widths)
     assert np.max(np.array(widths[1:]) / np.array(widths[:-1])) <= 2.0 + 1e-9
     offset = 0.008 * 200.0
     fitting = [v for v in widths if v < 0.02 and make_effect("backlash", "knee", half_width=v).plausible(
@@ -69,13 +74,49 @@ def test_a_spring_of_two_straight_sides_pushes_back_on_both():
 def test_play_in_series_leaves_the_torque_of_the_whole_spring_at_what_is_beyond_it():
     leg = load_robot("exo_leg")
     motion = random_motion(leg, samples=200, seed=4)
-    play = make_effect("backlash", "knee", half_width=0.01)
+    play = make_effect("backlash", "knee", half_width=0.01, softness=1e-6)
     parameters = {"knee.spring_stiffness": 200.0, "knee.spring_stiffening": 8000.0}
     play = play.anchored(Anchor(leg, (), parameters))
     d = motion.deflection[:, 1]
     beyond = d - np.clip(d, -0.01, 0.01)
     torque = 200.0 * d + 8000.0 * d**3 + 200.0 * play.evaluate(State(leg, motion)).motor[:, 1, 0]
     np.testing.assert_allclose(torque, 200.0 * beyond + 8000.0 * beyond**3, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("softness", [0.05, 0.5, 1.5])
+def test_soft_ends_of_play_are_met_with_a_logistic_spread(softness):
+    """The mean of hard play over ends that lie a little elsewhere each: integrated numerically."""
+    leg, width = load_robot("exo_leg"), 0.01
+    motion = random_motion(leg, samples=40, seed=4)
+    play = make_effect("backlash", "knee", half_width=width, softness=softness)
+    d = 0.03 * np.sin(np.linspace(0.0, 2.0 * np.pi, 40))
+    motion = replace(motion, theta=motion.q + d[:, None])
+    ends = stats.logistic(scale=0.5 * softness * width)
+    where = np.linspace(-30.0, 30.0, 40001) * ends.std()
+    hard = np.clip(d[:, None] + where, -width, width)
+    mean = np.trapezoid(hard * ends.pdf(where), where, axis=1)
+    np.testing.assert_allclose(play.evaluate(State(leg, motion)).motor[:, 1, 0], -mean, atol=1e-9)
+
+
+def test_ends_that_hardly_give_way_are_hard():
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=200, seed=4)
+    hard, nearly = (make_effect("backlash", "knee", half_width=0.01, softness=s) for s in (1e-9, 1e-5))
+    torques = [play.evaluate(State(leg, motion)).motor for play in (hard, nearly)]
+    np.testing.assert_allclose(*torques, atol=1e-8)
+
+
+def test_a_kink_just_out_of_reach_is_tried_on_both_sides_where_the_deflection_keeps_its_sign():
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=200, seed=4)
+    for sign in (1.0, -1.0):
+        theta = motion.q + sign * (0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None])
+        springs = make_effect("asymmetric_spring", "knee").variants(State(leg, replace(motion, theta=theta)))
+        near = [spring.kink for spring in springs if 0.01 < abs(spring.kink) < 0.02]
+        assert min(near) < 0.0 < max(near)
+    passed = make_effect("asymmetric_spring", "knee").variants(State(leg, motion))
+    largest = np.max(np.abs(motion.deflection[:, 1]))
+    assert {round(abs(spring.kink) / largest, 9) for spring in passed} == {0.0, 0.15, 0.3}
 
 
 def test_play_follows_the_cubic_stiffness_only_where_the_spring_has_a_law():

@@ -95,7 +95,7 @@ def planted_effects(
             yield one(0.5 * c, 0.5 * c, slip=s["width"])
         case "backlash":
             # play in series with the whole law of the spring, as in the other engine
-            yield one(truth.stiffness[i], half_width=c, cubic=float(truth.cubic[i] / truth.stiffness[i]))
+            yield one(truth.stiffness[i], half_width=c, softness=0.01, cubic=float(truth.cubic[i] / truth.stiffness[i]))
         case "link_friction":
             yield one(c * s["viscous"], c, smoothing=smoothing)
         case "parallel_spring":
