@@ -12,6 +12,7 @@ from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import (
     BESIDE_ANOTHER,
+    Selection,
     _acceptable,
     least_useful,
     next_effect,
@@ -225,3 +226,21 @@ def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
     assert fit.parameters[column.name] == pytest.approx(3000.0, rel=0.05)
     assert fit.parameters["knee.spring_stiffening"] == pytest.approx(8000.0, rel=0.1)
     assert ("spring_stiffening", "knee") not in {(c.effect.name, c.effect.joint) for c in scan(bench, fit, start.noise)}
+
+
+def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(laboratory):
+    """At certain times of a period a form that is not the right one leaves something too, and a push fits there."""
+    push = make_effect("external_force", "ankle", start=0.4, stop=0.9)
+    ripple = make_effect("torque_ripple", "hip", order=4.0)
+    planted = [("external_force", "ankle", [0.0, 0.0, 0.4], {"start": 0.4, "stop": 0.9})]
+
+    def kept(amplitude, known):
+        recording = laboratory.record([*planted, ("torque_ripple", "hip", [amplitude, 0.0], {"order": 4.0})])
+        bench = laboratory.bench(recording)
+        start = settle(bench, (*bench.effects, *known))
+        now = settle(bench, (*bench.effects, *known, push))
+        return still_needed(bench, Selection(start, now, 1, (1e-9,))).added
+
+    assert kept(2.0, []) == 0
+    assert kept(2.0, [ripple]) == 1
+    assert kept(0.01, []) == 1

@@ -222,5 +222,7 @@ def test_an_unknown_shape_is_told():
 
 @pytest.mark.parametrize("value", [0.0, -0.01, float("nan"), float("inf")])
 def test_a_shape_that_cannot_be_is_refused_with_its_range(value):
-    with pytest.raises(EffectError, match=r"'backlash' at 'knee': half_width = .* rad is not a positive number.*0\.5 rad"):
+    with pytest.raises(
+        EffectError, match=r"'backlash' at 'knee': half_width = .* rad is not a positive number.*0\.5 rad"
+    ):
         make_effect("backlash", "knee", half_width=value)
