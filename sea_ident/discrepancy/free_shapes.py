@@ -9,6 +9,7 @@ import numpy as np
 from sea_ident.effects import Effect, JointEffect, Shape
 from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
 
 SHAPES_THAT_STAY = {
     "spring_stiffening": ("exponent",),
@@ -53,13 +54,15 @@ def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
 def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
     """Shape parameters that a fit is free to change, and amounts of signal effects.
 
-    A push on the very centre of mass of a link stays there.
+    A push on the very centre of mass of a link stays there, and a saturation by a cube one.
     """
     found: list[tuple[int, Shape]] = []
     for position, effect in enumerate(effects):
         stay = SHAPES_THAT_STAY.get(effect.name, ())
         if isinstance(effect, ExternalForce) and not any(getattr(effect, name) for name in POINT):
             stay = (*stay, *POINT)
+        if isinstance(effect, TorqueSaturation) and effect.exponent == CUBE:
+            stay = (*stay, "exponent")
         shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
         found.extend((position, shape) for shape in shapes if shape.name not in stay)
     return tuple(found)

@@ -26,6 +26,7 @@ from sea_ident.discrepancy.judge import (
     torque_changes,
 )
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
+from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
@@ -179,19 +180,21 @@ def search(
 
 
 def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key]) -> Settled:
-    """A model whose pushes have their edges where they belong by now, and whose effects gave way to better ones.
+    """A model whose effects have the form that they need by now, and gave way to better ones.
 
     What is tried in the place of a push has sharp edges, and so must the push; what took the place of another effect
     may move them.
     """
-    now = _sharp(bench, now)
+    now = _formed(bench, now)
     exchanged = exchange(bench, now, added, tried, ruled_out)
-    return now if exchanged is now else _sharp(bench, _settled(bench, exchanged))
+    return now if exchanged is now else _formed(bench, _settled(bench, exchanged))
 
 
-def _sharp(bench: Bench, now: Settled) -> Settled:
+def _formed(bench: Bench, now: Settled) -> Settled:
+    """Pushes with their edges where they belong, saturation by the power that it needs."""
     sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
-    return now if sharp is now.fit else settle_again(bench, sharp)
+    now = now if sharp is now.fit else settle_again(bench, sharp)
+    return with_their_powers(bench, now, len(bench.effects))
 
 
 def _settled(bench: Bench, now: Settled) -> Settled:

@@ -12,6 +12,9 @@ from sea_ident.effects.base import Anchor, Column, Contribution, Shape, Side, St
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
 
+CUBE = 3.0
+"""Power of the first term of any saturation that is the same both ways [-]."""
+
 _STEPS = 12
 """Newton steps from the torque to the command."""
 
@@ -24,11 +27,13 @@ class TorqueSaturation(LoadEffect):
         exponent: p, a cube by default [-].
         coefficient: c of the model, by which u follows from the torque that the motor gives: u - c u^p = tau_m.
         found_with: the p that belongs to this c [-].
+        typical: torque at which as much is taken away with another p; that of the motion where 0 [N m].
     """
 
-    exponent: float = 3.0
+    exponent: float = CUBE
     coefficient: float = 0.0
-    found_with: float = 3.0
+    found_with: float = CUBE
+    typical: float = 0.0
 
     name: ClassVar[str] = "torque_saturation"
     side: ClassVar[Side] = Side.MOTOR
@@ -43,13 +48,18 @@ class TorqueSaturation(LoadEffect):
 
     def variants(self, state: State) -> tuple["TorqueSaturation", ...]:
         """The cube: other powers are nearly the same, and found from there."""
-        return (self,)
+        return (replace(self, typical=self._typical(self.motor_torque(state))),)
 
     def anchored(self, anchor: Anchor) -> "TorqueSaturation":
-        """With the load and the saturation of the model."""
-        loaded = super().anchored(anchor)
-        coefficient = max(anchor.value(self.parameter_name()), 0.0)
-        return replace(loaded, coefficient=coefficient, found_with=self.exponent)
+        """With the load and the saturation of the model.
+
+        Where the command saturates much, more of it leaves less to be explained: followed at once, the one would jump
+        about the other.
+        """
+        value = max(anchor.value(self.parameter_name()), 0.0)
+        if self.coefficient > 0.0 and (self.typical > 0.0 or self.found_with == self.exponent):
+            value = 0.5 * (value + self.coefficient * (self.typical or 1.0) ** (self.found_with - self.exponent))
+        return replace(super().anchored(anchor), coefficient=value, found_with=self.exponent)
 
     def evaluate(self, state: State) -> Contribution:
         """Power of the commanded torque."""
@@ -57,7 +67,7 @@ class TorqueSaturation(LoadEffect):
         command = torque
         if self.coefficient > 0.0:
             # what is taken away stays about the same with another exponent
-            typical = float(np.sqrt(np.mean(torque**2)))
+            typical = self.typical or self._typical(torque)
             coefficient = self.coefficient * typical ** (self.found_with - p)
             largest = (p * coefficient) ** (-1.0 / (p - 1.0))
             for _ in range(_STEPS):
@@ -66,6 +76,10 @@ class TorqueSaturation(LoadEffect):
                 slope = np.maximum(1.0 - p * coefficient * size ** (p - 1.0), 0.1)
                 command = np.clip(command - error / slope, -largest, largest)
         return state.at(self.side, self.at, (np.sign(command) * np.abs(command) ** p)[:, None])
+
+    @staticmethod
+    def _typical(torque: FloatArray) -> float:
+        return float(np.sqrt(np.mean(torque**2)))
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The power of the commanded torque."""

@@ -112,15 +112,3 @@ def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing)
     found = soft.effects[-1]
     assert np.log(found.half_width / shapes["half_width"]) == pytest.approx(0.0, abs=3.0 * soft.std(widths))
     assert np.log(found.softness / shapes["softness"]) == pytest.approx(0.0, abs=3.0 * soft.std(softness))
-
-
-def test_the_power_of_a_saturation_is_found(laboratory):
-    planted = [("torque_saturation", "knee", [3e-5], {"exponent": 4.2})]
-    bench = laboratory.bench(laboratory.record(planted, periods=6))
-    start = settle(bench, bench.effects)
-    effect = next(c.effect for c in scan(bench, start.fit, start.noise) if c.effect.name == "torque_saturation")
-    now = settle(bench, refitted(bench, bench.effects, effect, (), start.noise, start.fit.parameters).effects)
-    last = len(now.fit.columns) + len(now.fit.free_shapes) - 1
-    assert now.fit.effects[-1].exponent == pytest.approx(4.2, abs=3.0 * 4.2 * now.fit.std(last))
-    assert now.fit.std(last) < 0.1
-    assert now.fit.statistic < 1.2 * now.fit.dof

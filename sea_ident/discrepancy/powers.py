@@ -1,0 +1,49 @@
+"""Saturation by another power than a cube, where the cube leaves too much.
+
+The cube is the first term of any saturation that is the same both ways, and a power that is a little off does worse on
+larger torques than the cube does. So the power is found only where that takes away most of what the cube leaves. It is
+asked beside a settled model: how much is taken away, and in which noise, follows the power.
+"""
+
+from dataclasses import replace
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
+
+OTHER_POWER = 1.1
+"""Factor between the cube and the power from which another is found."""
+
+WORTH_A_POWER = 0.5
+"""Share of what the cube leaves that another power may leave [-]."""
+
+MOST_ROUNDS = 3
+"""Rounds in which what is taken away, the power and the noise follow each other."""
+
+
+def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
+    """A settled model in which a saturation has another power than three where that explains much more.
+
+    Args:
+        bench: the recording.
+        now: the model with what was found.
+        first: position of the first effect that was found.
+
+    Returns:
+        The model, settled; the same one where no power is worth it.
+    """
+    for position in range(first, len(now.fit.effects)):
+        effect = now.fit.effects[position]
+        if not isinstance(effect, TorqueSaturation) or effect.exponent != CUBE:
+            continue
+        if lack_of_fit(bench, now)[2] >= LACK_LEVEL:
+            break
+        effects = list(now.fit.effects)
+        effects[position] = replace(effect, exponent=OTHER_POWER * CUBE)
+        other = Settled(bench.refine(effects, now.noise, start=now.fit.parameters), now.noise)
+        for _ in range(MOST_ROUNDS):
+            other = settle_again(bench, other.fit)
+        if other.fit.excess < WORTH_A_POWER * now.fit.excess:
+            now = other
+    return now

@@ -1,0 +1,52 @@
+"""Saturation by another power than a cube."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.powers import with_their_powers
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.settle import settle, settle_again
+
+
+def saturated(laboratory, coefficient, exponent):
+    """A recording with saturation at the knee, and the model with a cube, settled."""
+    planted = [("torque_saturation", "knee", [coefficient], {"exponent": exponent})]
+    bench = laboratory.bench(laboratory.record(planted))
+    start = settle(bench, bench.effects)
+    scanned = scan(bench, start.fit, start.noise)
+    effect = next(c.effect for c in scanned if (c.effect.name, c.effect.joint) == ("torque_saturation", "knee"))
+    now = settle_again(bench, refitted(bench, bench.effects, effect, (), start.noise, start.fit.parameters))
+    for _ in range(4):
+        now = settle_again(bench, now.fit)
+    return bench, now
+
+
+def test_the_power_is_found_where_the_cube_leaves_much(laboratory):
+    bench, cube = saturated(laboratory, 1e-2, 1.8)
+    assert cube.fit.statistic > 1.2 * cube.fit.dof
+    now = with_their_powers(bench, cube, len(bench.effects))
+    exponent, std = now.fit.effects[-1].exponent, now.fit.std(len(now.fit.columns) + len(now.fit.free_shapes) - 1)
+    assert exponent == pytest.approx(1.8, abs=3.0 * exponent * std)
+    assert std < 0.1
+    assert now.fit.statistic < 1.1 * now.fit.dof
+
+
+def test_a_cube_stays_one(laboratory):
+    bench, cube = saturated(laboratory, 1e-3, 3.0)
+    assert with_their_powers(bench, cube, len(bench.effects)) is cube
+    assert cube.fit.effects[-1].exponent == 3.0
+    last = next(k for k, c in enumerate(cube.fit.columns) if c.name == "knee.torque_saturation")
+    assert cube.fit.values[last] == pytest.approx(1e-3, abs=3.0 * cube.fit.std(last))
+
+
+def test_much_saturation_stands_still(laboratory):
+    """Followed at once, the command that saturates and what is taken away jump about each other."""
+    bench, now = saturated(laboratory, 1e-3, 3.0)
+    seen = []
+    for _ in range(4):
+        now = settle_again(bench, now.fit)
+        seen.append((now.fit.effects[-1].coefficient, now.fit.statistic / now.fit.dof))
+    coefficients, ratios = np.array(seen).T
+    np.testing.assert_allclose(coefficients, 1e-3, rtol=0.05)
+    assert np.max(ratios) < 1.2
