@@ -12,8 +12,8 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
 
-OTHER_POWER = 1.1
-"""Factor between the cube and the power from which another is found."""
+OTHER_POWER = 1.2
+"""Factor between the cube and the powers, a higher and a lower one, from which another is found."""
 
 WORTH_A_POWER = 0.5
 """Share of what the cube leaves that another power may leave [-]."""
@@ -39,9 +39,12 @@ def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
             continue
         if lack_of_fit(bench, now)[2] >= LACK_LEVEL:
             break
-        effects = list(now.fit.effects)
-        effects[position] = replace(effect, exponent=OTHER_POWER * CUBE)
-        other = Settled(bench.refine(effects, now.noise, start=now.fit.parameters), now.noise)
+        begun = []
+        for factor in (OTHER_POWER, 1.0 / OTHER_POWER):
+            effects = list(now.fit.effects)
+            effects[position] = replace(effect, exponent=factor * CUBE)
+            begun.append(bench.refine(effects, now.noise, start=now.fit.parameters))
+        other = Settled(min(begun, key=lambda fit: fit.statistic), now.noise)
         for _ in range(MOST_ROUNDS):
             other = settle_again(bench, other.fit)
         if other.fit.excess < WORTH_A_POWER * now.fit.excess:

@@ -23,7 +23,7 @@ def saturated(laboratory, coefficient, exponent):
 
 
 def test_the_power_is_found_where_the_cube_leaves_much(laboratory):
-    bench, cube = saturated(laboratory, 1e-2, 1.8)
+    bench, cube = saturated(laboratory, 1.5e-2, 1.8)
     assert cube.fit.statistic > 1.2 * cube.fit.dof
     now = with_their_powers(bench, cube, len(bench.effects))
     exponent, std = now.fit.effects[-1].exponent, now.fit.std(len(now.fit.columns) + len(now.fit.free_shapes) - 1)
