@@ -1,8 +1,8 @@
 """A spring that creeps, which the library does not have: what it carries relaxes with time.
 
-Loading and unloading take two ways, as with dry friction in the spring. What tells them apart is what the way between
-depends on: dry friction knows how far the spring was bent and not for how long, a spring in series with a damper how
-long and not how far. At one speed with one reach both look alike; a motion of several tells.
+Loading and unloading take two ways, as with dry friction in the spring. What dry friction holds back does not depend on
+how fast the spring is bent; what a spring in series with a damper holds back fades with time. In one wave both look
+alike, a motion of several tells.
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +14,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.effects import Column, Contribution, Effect, Shape, State
 from sea_ident.effects.acting import Action
+from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.spring import SpringEffect
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -74,11 +75,12 @@ class Creep(SpringEffect):
     @property
     def in_words(self) -> str:
         """What it does."""
-        return f"relaxing with time, as a spring that creeps with a time constant of {self.time_constant:.3g} s does"
+        relaxing = f"relaxing with time in the spring of {self.joint}"
+        return f"{relaxing}, as one that creeps with a time constant of {self.time_constant:.3g} s does"
 
 
 def creeping(bench: Bench, effect: Effect) -> tuple[Creep, ...]:
-    """Creep in the place of what was found in a spring; none elsewhere."""
-    if effect.joint is None or effect.side is not Creep.side:
-        return ()
-    return (Creep(effect.joint),) if bench.robot.index(effect.joint) in bench.robot.elastic_indices else ()
+    """Creep in the place of what was found in a spring, and in that of a push in every period at any spring."""
+    everywhere = isinstance(effect, ExternalForce)
+    places = Creep.instances(bench.robot) if everywhere or effect.side is Creep.side else ()
+    return tuple(place for place in places if everywhere or place.joint == effect.joint)

@@ -8,7 +8,7 @@ named one is not what is there. Whether what the named one leaves stands out of 
 
 What pushes in every period may be a law of the position: the end of the range of a joint, which its motion comes to in
 every pass. So a push is held against such ends, and so is any effect where something is left beside what was found.
-What was found in a spring and leaves something is held against a spring that creeps, too.
+What was found in a spring, or as a push, and leaves something is held against a spring that creeps, too.
 
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that

@@ -55,10 +55,10 @@ class PlantedCreep(Creep):
         return Creeping(robot.index(self.joint), float(values[0]), self.time_constant)
 
 
-def found(bench):
+def found(bench, slip=0.01):
     """What a search would give that found dry friction in the spring of the knee."""
     start = settle(bench, bench.effects)
-    hysteresis = make_effect("spring_hysteresis", "knee", slip=0.01)
+    hysteresis = make_effect("spring_hysteresis", "knee", slip=slip)
     fit = refitted(bench, start.fit.effects, hysteresis, (), start.noise, start.fit.parameters)
     return Selection(start, settle_again(bench, fit), 1, (0.0,))
 
@@ -85,6 +85,8 @@ def test_it_is_the_steady_state_of_its_equation(leg, thinned, time_constant):
 def test_where_it_can_be(nothing_missing):
     bench = nothing_missing[0]
     assert creeping(bench, make_effect("spring_hysteresis", "knee")) == (Creep("knee"),)
+    push = make_effect("external_force", "knee", start=1.0, stop=2.0, period=5.0)
+    assert creeping(bench, push) == (Creep("hip"), Creep("knee"), Creep("ankle"))
     assert creeping(bench, make_effect("torque_ripple", "knee")) == ()
     assert creeping(bench, make_effect("base_tilt")) == ()
     with pytest.raises(EffectError, match="creep"):
@@ -101,7 +103,7 @@ def test_creep_is_no_hysteresis(laboratory, leg):
     assert one.share < 0.05
     assert one.fit.effects[-1].time_constant == pytest.approx(0.25, rel=0.05)
     assert one.fit.parameters["knee.creep"] == pytest.approx(stiffness, rel=0.05)
-    assert "a spring that creeps with a time constant of 0.2" in one.sentence
+    assert "in the spring of knee, as one that creeps with a time constant of 0.2" in one.sentence
     confirmed = Confirmed(selection, bench, selection.start, selection.final)
     said = conclude(bench, confirmed, TrendTest(1.0, (), False), {}, None, None, Findings(), (one,))
     assert said.verdict is Verdict.NOT_IN_LIBRARY
@@ -119,6 +121,6 @@ def test_hysteresis_is_no_creep_whatever_else_is_missing(laboratory, beside):
     """More elements of dry friction than the library has, or another effect that has not been found."""
     own = ("spring_hysteresis", "knee", [1.0, 0.6], {"slip": 0.002})
     bench = laboratory.bench(laboratory.record([own, beside], periods=5))
-    selection = found(bench)
+    selection = found(bench, 0.003)
     assert lack_of_fit(bench, selection.final)[2] < LACK_LEVEL
     assert unnamed(bench, selection, None) == ()
