@@ -24,7 +24,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.creeping import Creep, creeping
+from sea_ident.discrepancy.creeping import Creep, creeping, no_dry_friction
 from sea_ident.discrepancy.end_stops import EndStop, end_stops
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
@@ -192,6 +192,8 @@ def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]
         if fit.statistic - new.statistic < better * new.unit:
             continue
         if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
+            continue
+        if isinstance(candidate.effect, Creep) and not no_dry_friction(bench, new, position, noise):
             continue
         if best is None or share < best.share:
             best = Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new)
