@@ -8,6 +8,7 @@ named one is not what is there. Whether what the named one leaves stands out of 
 
 What pushes in every period may be a law of the position: the end of the range of a joint, which its motion comes to in
 every pass. So a push is held against such ends, and so is any effect where something is left beside what was found.
+What was found in a spring, or as a push, and leaves something is held against a spring that creeps, too.
 
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
@@ -23,6 +24,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.creeping import Creep, creeping, no_dry_friction
 from sea_ident.discrepancy.end_stops import EndStop, end_stops
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
@@ -107,8 +109,11 @@ def unnamed(
     stops = end_stops(bench)
     leaves = lack_of_fit(bench, now)[2] < LACK_LEVEL
     for k in range(selection.added):
-        may_be_one = leaves or isinstance(now.fit.effects[first + k], ExternalForce)
-        best = _best(bench, now, first + k, stops if may_be_one else ())
+        own = now.fit.effects[first + k]
+        outside: tuple[Effect, ...] = stops if leaves or isinstance(own, ExternalForce) else ()
+        if leaves:
+            outside = (*outside, *creeping(bench, own))
+        best = _best(bench, now, first + k, outside)
         if best is not None and _holds(best, selection, held, k):
             found.append(best)
     return (*pairs, *found)
@@ -164,12 +169,12 @@ def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int
     return rival.holds and rival.statistic < own.statistic
 
 
-def _best(bench: Bench, now: Settled, position: int, stops: tuple[EndStop, ...]) -> Unnamed | None:
-    """The relative in the place of an effect that explains much more, of its own ones and some ends of the range."""
+def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]) -> Unnamed | None:
+    """What explains much more in the place of an effect, of its own relatives and some of no kin."""
     fit, noise = now.fit, now.noise
     own = fit.effects[position]
     others = [e for k, e in enumerate(fit.effects) if k != position]
-    family: tuple[Effect, ...] = (*relatives_of(bench, fit.effects, own), *stops)
+    family: tuple[Effect, ...] = (*relatives_of(bench, fit.effects, own), *outside)
     if not family:
         return None
     reduced = bench.fit(others, noise, start=fit.parameters)
@@ -188,13 +193,15 @@ def _best(bench: Bench, now: Settled, position: int, stops: tuple[EndStop, ...])
             continue
         if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
             continue
+        if isinstance(candidate.effect, Creep) and not no_dry_friction(bench, new, position, noise):
+            continue
         if best is None or share < best.share:
             best = Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new)
     return best
 
 
 def _in_words(relative: Effect) -> str:
-    if isinstance(relative, EndStop):
+    if isinstance(relative, EndStop | Creep):
         return relative.in_words
     if isinstance(relative, BehindTheSpring):
         return f"{relative.name} on the link"
