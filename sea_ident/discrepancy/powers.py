@@ -39,14 +39,18 @@ def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
             continue
         if lack_of_fit(bench, now)[2] >= LACK_LEVEL:
             break
-        begun = []
-        for factor in (OTHER_POWER, 1.0 / OTHER_POWER):
-            effects = list(now.fit.effects)
-            effects[position] = replace(effect, exponent=factor * CUBE)
-            begun.append(bench.refine(effects, now.noise, start=now.fit.parameters))
-        other = Settled(min(begun, key=lambda fit: fit.statistic), now.noise)
-        for _ in range(MOST_ROUNDS):
-            other = settle_again(bench, other.fit)
+        found = [_followed(bench, now, position, factor * CUBE) for factor in (OTHER_POWER, 1.0 / OTHER_POWER)]
+        other = min(found, key=lambda each: each.fit.excess)
         if other.fit.excess < WORTH_A_POWER * now.fit.excess:
             now = other
     return now
+
+
+def _followed(bench: Bench, now: Settled, position: int, power: float) -> Settled:
+    """A model with a saturation whose power is found from a given one, settled."""
+    effects = list(now.fit.effects)
+    effects[position] = replace(effects[position], exponent=power)  # type: ignore[call-arg]
+    other = Settled(bench.refine(effects, now.noise, start=now.fit.parameters), now.noise)
+    for _ in range(MOST_ROUNDS):
+        other = settle_again(bench, other.fit)
+    return other
