@@ -30,7 +30,7 @@ class PreslidingFriction(OneWayEffect):
     name: ClassVar[str] = "presliding_friction"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Dahl, A solid friction model, Aerospace Corp., 1968"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("displacement", "rad", 1e-4, 0.2, points=7),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("displacement", "rad", 1e-6, 0.2, points=11),)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
