@@ -176,23 +176,26 @@ class Transfer:
         return not self.tested or self.share > TRANSFERS
 
 
-def transfer(bench: Bench, selection: Selection, now: Settled) -> list[Transfer]:
-    """Try every effect that was added on other data: its parameters as they are, the rest of the model fitted anew.
+def transfer(
+    bench: Bench, selection: Selection, now: Settled, positions: Sequence[int] | None = None
+) -> list[Transfer]:
+    """Try effects that were added on other data: their parameters as they are, the rest of the model fitted anew.
 
     Args:
         bench: the other data.
         selection: what was found.
         now: the found model, fitted anew to the other data, with the noise floor there.
+        positions: of the effects in the model; all that were added by default.
 
     Returns:
-        One result for each effect that was added.
+        One result for each of them.
     """
     fit, noise = selection.final.fit, now.noise
     first = len(fit.effects) - selection.added
     base = list(fit.effects[:first])
     added = list(range(first, len(fit.effects)))
     out = []
-    for position in added:
+    for position in added if positions is None else positions:
         others = [p for p in added if p != position]
         signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
         own_signal = [fit.effects[position]] if isinstance(fit.effects[position], SignalEffect) else []

@@ -130,12 +130,11 @@ def decide(
             if _twice(fit, position, selection.added):
                 continue
             replaced = replace(selection, final=Settled(fit, selection.final.noise))
-            there = held.again(replaced)
-            rival = there.transfers[position - first]
+            rival = held.worth(replaced, position)
             if _better(rival, own):
                 before = selection.final.fit
                 selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
-                held = there
+                held = held.again(replaced)
                 # what was no better than the one that is now out was no better than this one
                 left = []
                 out = before.effects[position]
@@ -158,7 +157,7 @@ def _with_another_shape(
 ) -> Fit | None:
     """A fit whose effect the other motion rules out, with a shape with which it does not; None where there is none."""
     own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
-    for other, result, _ in _open_shapes(bench, selection, held, position, fit, found):
+    for other, result in _open_shapes(bench, selection, held, position, fit, found):
         if not _better(own, result):
             return other
     return None
@@ -170,16 +169,16 @@ def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, posi
     best = held.transfers[position - len(fit.effects) + selection.added]
     if best.excess < EQUALLY_GOOD * best.unit:
         return selection, held
-    for other, result, there in _open_shapes(bench, selection, held, position, fit, best):
+    chosen = selection
+    for other, result in _open_shapes(bench, selection, held, position, fit, best):
         if _better(result, best):
-            best, selection = result, replace(selection, final=Settled(other, selection.final.noise))
-            held = there
-    return selection, held
+            best, chosen = result, replace(selection, final=Settled(other, selection.final.noise))
+    return chosen, held if chosen is selection else held.again(chosen)
 
 
 def _open_shapes(
     bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
-) -> Iterator[tuple[Fit, Transfer, HeldOut]]:
+) -> Iterator[tuple[Fit, Transfer]]:
     """A fit with other shapes of one effect that do as well on the motion that was used.
 
     A motion may leave a shape open: play that is never closed is the same torque whatever its width. Then only all the
@@ -209,9 +208,8 @@ def _open_shapes(
             other = bench.fit(effects, noise, start=base.parameters)
             if other.statistic - base.statistic > enough or not physical(bench, other, position):
                 break
-            there = held.again(replace(selection, final=Settled(other, noise)))
-            result = there.transfers[position - len(effects) + selection.added]
-            yield other, result, there
+            result = held.worth(replace(selection, final=Settled(other, noise)), position)
+            yield other, result
             if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:
                 break
             last = result

@@ -71,6 +71,12 @@ class HeldOut:
         found = tried(self.bench, selection, self.source)
         return replace(found, processed=self.processed, recording=self.recording, kind=self.kind)
 
+    def worth(self, selection: Selection, position: int) -> assess.Transfer:
+        """What one effect of another selection is worth on the same data, by its position in the model."""
+        _, now = _fitted_anew(self.bench, selection)
+        (found,) = assess.transfer(self.bench, selection, now, [position])
+        return found
+
 
 def held_out(
     bench: Bench, selection: Selection, holdout: Recording | ProcessedRecording | None
@@ -147,14 +153,22 @@ def other_periods(bench: Bench, selection: Selection) -> HeldOut | None:
 
 def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     """A selection on data that it was not fitted to."""
-    start, final = selection.start.fit, selection.final.fit
-    before = other.predicted(start.effects, start.parameters)
-    after = other.predicted(final.effects, final.parameters)
-    remembering = [effect.required_joint for effect in selection.effects if isinstance(effect, SpringHysteresis)]
-    before, after = (without_history(other, fit, remembering) for fit in (before, after))
-    now: Settled = settle_again(other, after)
+    start = selection.start.fit
+    before = without_history(other, other.predicted(start.effects, start.parameters), _remembering(selection))
+    after, now = _fitted_anew(other, selection)
     transfers = tuple(assess.transfer(other, selection, now)) if selection.added else ()
     return HeldOut(other, before, after, other.noise(after), transfers, source)
+
+
+def _fitted_anew(other: Bench, selection: Selection) -> tuple[Fit, Settled]:
+    """What was found on data that it was not fitted to: with its parameters as they are, and fitted to them."""
+    final = selection.final.fit
+    after = without_history(other, other.predicted(final.effects, final.parameters), _remembering(selection))
+    return after, settle_again(other, after)
+
+
+def _remembering(selection: Selection) -> list[str]:
+    return [effect.required_joint for effect in selection.effects if isinstance(effect, SpringHysteresis)]
 
 
 def without_history(bench: Bench, fit: Fit, joints: Sequence[str]) -> Fit:

@@ -64,8 +64,7 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
         stiff = fit.parameters[f"{effect.joint}.spring_stiffness"] > 0.0
         if not stiff or any(fit.parameters[column.name] < 0.0 for column in effects[position].columns(bench.robot)):
             continue
-        there = held.again(replace(selection, final=Settled(fit, selection.final.noise)))
-        left = there.transfers[position - len(effects) + selection.added].statistic
+        left = held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position).statistic
         if best is None or left < best[0]:
             best = left, fit
     return None if best is None else Alternative(SpringHysteresis.name, effect.joint, 1.0, best[1], dearer=True)

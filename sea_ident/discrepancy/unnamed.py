@@ -157,7 +157,7 @@ def _transfers(fit: Fit, selection: Selection, held: HeldOut | None) -> bool:
     if held is None or not held.other_motion:
         return True
     fewer = replace(selection, final=replace(selection.final, fit=fit), added=selection.added - 1)
-    return held.again(fewer).transfers[-1].holds
+    return held.worth(fewer, len(fit.effects) - 1).holds
 
 
 def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int) -> bool:
@@ -165,7 +165,8 @@ def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int
     if held is None or not held.other_motion:
         return True
     replaced = replace(selection, final=replace(selection.final, fit=relative.fit))
-    rival, own = held.again(replaced).transfers[k], held.transfers[k]
+    first = len(relative.fit.effects) - selection.added
+    rival, own = held.worth(replaced, first + k), held.transfers[k]
     return rival.holds and rival.statistic < own.statistic
 
 

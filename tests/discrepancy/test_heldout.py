@@ -50,6 +50,18 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     assert power[1] < 0.3 * power[0]
 
 
+def test_what_one_of_several_effects_is_worth_is_what_it_is_among_all(laboratory):
+    planted = [("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0}), ("spring_offset", "knee", [0.5], {})]
+    bench = laboratory.bench(laboratory.record(planted))
+    start = settle(bench, bench.effects)
+    added = make_effect("torque_ripple", "hip", order=4.0), make_effect("spring_hysteresis", "knee", slip=0.02)
+    selection = Selection(start, settle(bench, (*bench.effects, *added)), 2, (1e-9, 1e-9))
+    found = held_out(bench, selection, laboratory.record(planted, motion=1, seed=8))[0]
+    first = len(bench.effects)
+    assert tuple(found.worth(selection, first + k) for k in range(2)) == found.transfers
+    assert found.transfers[0] != found.transfers[1]
+
+
 def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
     """Whatever sensors and friction made of it, and wherever in it the recording begins."""
     again = laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, seed=9)
