@@ -40,6 +40,10 @@ DEPARTURE_LEVEL = 1e-3
 """Probability below which the strongest departure at a joint is none of the usual ones, with tails as heavy as
 exponential ones."""
 
+MANY, MOST = 5, 0.5
+"""Of so many departures at a joint no more than this share may peak beside reversals: else friction there differs from
+pass to pass, and some of it lasts."""
+
 LONGEST = 0.25
 """Share of the recording that pushes at a joint may take; beyond it the residual is no push but a poor model."""
 
@@ -165,7 +169,7 @@ def _runs(
     joined = binary_dilation(low & near, iterations=max(1, gap // 4))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], joined.astype(int), [0]])))
     found: list[Push] = []
-    clear = False
+    clear, beside = False, 0
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         inside = np.flatnonzero((low & near)[first:last]) + first
         if not np.any(high[first:last]):
@@ -186,12 +190,14 @@ def _runs(
         moving = length - interval * np.count_nonzero(slow[span])
         if departure_p(z, len(time)) < DEPARTURE_LEVEL:
             clear = bool(clear or not reversing[peak] or moving >= CLEAR_AT_REVERSAL)
+        beside += int(reversing[peak])
         found.append(
             Push(
                 joint, float(time[begin]), float(time[end]), float(smooth[peak]),
                 float(own[span].sum() * interval), z,
             )
         )  # fmt: skip
-    if not clear or sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
+    friction = len(found) >= MANY and beside > MOST * len(found)
+    if friction or not clear or sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
         return []
     return found

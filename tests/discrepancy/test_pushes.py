@@ -57,6 +57,21 @@ def test_what_comes_again_in_every_pass_is_no_push():
         assert find_pushes(TIME, residual(seed), SPEED, SAMPLES) == ()
 
 
+def test_departures_that_come_beside_reversals_are_friction_even_where_one_lasts():
+    """Friction that lets go at another instant in every pass; pushes come at any time."""
+    turns = np.flatnonzero(np.diff(np.sign(SPEED[:, 1])) != 0.0)[1:-1]
+    rng = np.random.default_rng(5)
+    lasting = residual()
+    for k, turn in enumerate(rng.choice(turns, 8, replace=False)):
+        lasting[turn - 1 : turn + (16 if k == 0 else 4), 1] += 1.5 * rng.choice([-1.0, 1.0])
+    assert find_pushes(TIME, lasting, SPEED, SAMPLES) == ()
+    anywhere = residual()
+    starts = np.sort(rng.choice(len(TIME) // 60 - 1, 8, replace=False)) * 60 + 20
+    for start in starts:
+        anywhere[start : start + 12, 1] += 1.5
+    assert len(find_pushes(TIME, anywhere, SPEED, SAMPLES)) == 8
+
+
 def test_what_lasts_for_most_of_the_time_is_a_poor_model():
     values = residual()
     values[500:2500, 0] += 2.0
