@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.diagnose import _out
-from sea_ident.discrepancy.judge import dissipates, physical, pushes_back
+from sea_ident.discrepancy.judge import at_a_bound, dissipates, physical, pushes_back
 from sea_ident.effects import make_effect
 
 
@@ -101,3 +101,19 @@ def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing
         values[names.index("knee.coulomb_friction")] = dry
         values[names.index(f"knee.{name}")] = 1.0 / largest
         assert physical(bench, replace(fit, values=values), -1) == accepted
+
+
+@pytest.mark.parametrize(
+    ("name", "shapes", "ended"),
+    [
+        ("backlash", {"half_width": 1e-5}, True),
+        # hard ends, and ends as soft as there are, are play all the same
+        ("backlash", {"softness": 0.01}, False),
+        ("backlash", {"softness": 1.5}, False),
+        ("presliding_friction", {"displacement": 1e-6}, True),
+        ("presliding_friction", {"displacement": 3e-5}, False),
+        ("torque_saturation", {"exponent": 9.0}, True),
+    ],
+)
+def test_a_width_that_ended_at_the_end_of_its_range_is_something_else(name, shapes, ended):
+    assert at_a_bound(make_effect(name, "knee", **shapes)) is ended

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import settle, settle_again
 
 
-def saturated(laboratory, coefficient, exponent):
-    """A recording with saturation at the knee, and the model with a cube, settled."""
-    planted = [("torque_saturation", "knee", [coefficient], {"exponent": exponent})]
+def saturated(laboratory, coefficient, exponent, *others):
+    """A recording with saturation at the knee and what else is planted, and the model with a cube, settled."""
+    planted = [("torque_saturation", "knee", [coefficient], {"exponent": exponent}), *others]
     bench = laboratory.bench(laboratory.record(planted))
     start = settle(bench, bench.effects)
     scanned = scan(bench, start.fit, start.noise)
@@ -50,3 +51,9 @@ def test_much_saturation_stands_still(laboratory):
     coefficients, ratios = np.array(seen).T
     np.testing.assert_allclose(coefficients, 1e-3, rtol=0.05)
     assert np.max(ratios) < 1.2
+
+
+def test_what_another_effect_leaves_speaks_for_no_other_power(laboratory):
+    bench, cube = saturated(laboratory, 6e-4, 3.0, ("torque_ripple", "hip", [0.3, 0.2], {"order": 4.0}))
+    assert lack_of_fit(bench, cube)[2] < LACK_LEVEL
+    assert with_their_powers(bench, cube, len(bench.effects)) is cube

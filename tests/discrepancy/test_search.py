@@ -7,6 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.refit import refitted
@@ -244,3 +245,21 @@ def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(la
     assert kept(2.0, []) == 0
     assert kept(2.0, [ripple]) == 1
     assert kept(0.01, []) == 1
+
+
+def test_what_promises_about_as_much_as_the_best_is_refitted_though_others_come_first(rippled):
+    bench, start, _ = rippled
+    scanned = scan(bench, start.fit, start.noise)
+    right = next(c for c in scanned if (c.effect.name, c.effect.joint) == ("torque_ripple", "hip"))
+    motor = [c for c in scanned if c.effect.side is right.effect.side and c.key != right.key]
+    others = [c for c in motor if not is_signal(c.effect) and c.effect.joint != "hip"][:4]
+    smallest = np.full(len(bench.data.equations), 1e-3)
+
+    def chosen(share):
+        first = [replace(c, gain=1.01 * right.gain) for c in others]
+        step = next_effect(bench, start, [*first, replace(right, gain=share * right.gain)], 1000, smallest)
+        return step is not None and step[0].effects[-1].name == "torque_ripple"
+
+    assert len(others) == 4
+    assert chosen(1.0)
+    assert not chosen(0.5)
