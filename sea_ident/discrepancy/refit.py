@@ -79,8 +79,8 @@ def refitted(
     fits: list[Fit] = []
     for each in begun:
         model = (*before, each, *after)
-        amount = fits and isinstance(each, SignalEffect)
-        if amount and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
+        later = bool(fits) and isinstance(each, SignalEffect)
+        if later and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
             continue
         if isinstance(each, ExternalForce):
             fits.append(bench.fit(model, noise, start=start))

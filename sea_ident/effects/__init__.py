@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import import_module, metadata
 from inspect import getmembers, isabstract, isclass
+from numbers import Real
 from pkgutil import iter_modules
 from typing import Any
 
@@ -99,11 +100,11 @@ def make_effect(name: str, joint: str | None = None, **shape: Any) -> Effect:
     except TypeError as error:
         raise EffectError(f"effect {name!r}: {error}") from None
     for known in effect.shapes:
-        value = float(getattr(effect, known.name))
-        if not math.isfinite(value) or (known.logarithmic and value <= 0.0):
+        value = getattr(effect, known.name)
+        if not isinstance(value, Real) or not math.isfinite(value) or (known.logarithmic and value <= 0.0):
             expected = "a positive number" if known.logarithmic else "a finite number"
             raise EffectError(
-                f"effect {name!r} at {joint!r}: {known.name} = {value:g} {known.unit} is not {expected}; usual are "
+                f"effect {name!r} at {joint!r}: {known.name} = {value} {known.unit} is not {expected}; usual are "
                 f"{known.lower:g} to {known.upper:g} {known.unit}"
             )
     return effect

@@ -20,7 +20,7 @@ SOFT = 0.5
 """Softness of the ends of a play that a search tries beside `NEARLY_HARD` ones, of every third width [-]."""
 
 NEARLY_HARD = 0.05
-"""Softness of ends that hardly a motion tells apart from hard ones, from which a search begins [-]."""
+"""Softness that few motions tell from hard ends, from which a search begins [-]."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Backlash(SpringEffect):
     Attributes:
         joint: joint at which it acts.
         half_width: w [rad] or [m].
-        softness: s of its ends, which is nothing for hard ones; these are nearly hard [-].
+        softness: s of its ends; the smaller, the harder [-].
         cubic: r of the spring that the play is in series with [1/rad2] or [1/m2].
     """
 

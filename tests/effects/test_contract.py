@@ -220,7 +220,7 @@ def test_an_unknown_shape_is_told():
         make_effect("stribeck_friction", "knee", colour=1.0)
 
 
-@pytest.mark.parametrize("value", [0.0, -0.01, float("nan"), float("inf")])
+@pytest.mark.parametrize("value", [0.0, -0.01, float("nan"), float("inf"), "wide", None])
 def test_a_shape_that_cannot_be_is_refused_with_its_range(value):
     with pytest.raises(
         EffectError, match=r"'backlash' at 'knee': half_width = .* rad is not a positive number.*0\.5 rad"
