@@ -102,10 +102,11 @@ def make_effect(name: str, joint: str | None = None, **shape: Any) -> Effect:
     for known in effect.shapes:
         value = getattr(effect, known.name)
         if not isinstance(value, Real) or not math.isfinite(value) or (known.logarithmic and value <= 0.0):
+            unit = "" if known.unit in ("-", "1") else f" {known.unit}"
             expected = "a positive number" if known.logarithmic else "a finite number"
             raise EffectError(
-                f"effect {name!r} at {joint!r}: {known.name} = {value} {known.unit} is not {expected}; usual are "
-                f"{known.lower:g} to {known.upper:g} {known.unit}"
+                f"effect {name!r} at {joint!r}: {known.name} = {value}{unit} is not {expected}; usual are "
+                f"{known.lower:g} to {known.upper:g}{unit}"
             )
     return effect
 
