@@ -43,3 +43,16 @@ def test_hidden_effects_are_found_and_nothing_is_invented(tmp_path: Path) -> Non
     wrong = [s for s in scores if s.named and s.false_beyond_sets() and s.case.row != "unknown"]
     assert len(wrong) <= 2, told
     assert sum(s.named for s in rows["unknown"]) <= 1, told
+
+
+STICKING = (82689117, "other_form", 13)
+"""A hip that true stiction holds for a tenth of a second with twice its sliding friction, and lets go elsewhere in
+every pass: samples that stand are compared nowhere, and the mean of the passes hardly shows it."""
+
+
+def test_stiction_that_lets_go_elsewhere_in_every_pass_is_named(tmp_path: Path) -> None:
+    seed, row, index = STICKING
+    run([Task(tmp_path, seed, row, index, False)], jobs=1)
+    (score,) = score_run(tmp_path)
+    assert score.finder(score.main) is not None, misses_text([score])
+    assert not score.false_beyond_sets()

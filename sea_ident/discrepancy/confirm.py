@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
@@ -61,6 +62,8 @@ class Confirmed:
 def confirm(bench: Bench, selection: Selection) -> Confirmed:
     """Take out the effects that only the samples near reversals speak for.
 
+    Stiction stays that every pass shows where its motor is let go.
+
     Args:
         bench: the recording.
         selection: what was found.
@@ -80,7 +83,9 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         columns = max(len(final.fit.effects[first + k].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
         if p_value > FAMILY_LEVEL or torque_change(away, final.fit, less) < SMALLEST_SHARE:
-            weak.append(k)
+            rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
+            if not lets_go_late(bench, rest, final.fit.effects[first + k]):
+                weak.append(k)
     found = Confirmed(selection, away, start, final)
     return found.less(without(bench, selection, weak)) if weak else found
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.edges import sharpened
@@ -315,7 +316,10 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: F
         smallest = np.minimum(smallest, SMALLEST_SHARE)
     if np.all(visible_changes(bench, fit, new) < smallest):
         return False
-    return scatter_p(steps, fit.whitened - new.whitened) <= SCATTER_LEVEL
+    if scatter_p(steps, fit.whitened - new.whitened) <= SCATTER_LEVEL:
+        return True
+    # what differs from pass to pass because each is let go at another instant may be stiction all the same
+    return lets_go_late(bench, fit, effect)
 
 
 def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:

@@ -62,7 +62,12 @@ def compared_beside_reversals(data: PeriodData) -> PeriodData:
 def _stands(data: PeriodData, joint: int) -> NDArray[np.bool_]:
     """(N,) samples whose mean speed is not known to its sign by the noise of the encoder, or beside a change of it."""
     speed = data.motion.dtheta[:, joint]
-    scatter = np.std([period.dtheta[:, joint] for period in data.period_motions], axis=0, ddof=1)
     turned = np.sign(speed) != np.sign(np.roll(speed, 1))
-    noisy = np.abs(speed) < UNCERTAIN_SIGN * float(np.median(scatter))
+    noisy = np.abs(speed) < known_speed(data, joint)
     return np.asarray(noisy | turned | np.roll(turned, -1))
+
+
+def known_speed(data: PeriodData, joint: int) -> float:
+    """Speed of a motor above which its sign is known by the noise of the encoder [rad/s] or [m/s]."""
+    scatter = np.std([period.dtheta[:, joint] for period in data.period_motions], axis=0, ddof=1)
+    return UNCERTAIN_SIGN * float(np.median(scatter))

@@ -1,0 +1,119 @@
+"""Stiction that lets go at another instant in every pass: it is gone from their mean, and every pass shows it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.breakaway import LEVEL, breakaway_excess, breakaway_p, let_go, lets_go_late
+from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.standing import known_speed
+from sea_ident.effects import make_effect
+
+KNEE = 1
+"""Index of the knee of the leg."""
+
+BEFORE, AFTER = 3, 2
+"""Samples before a motor is let go in which stiction holds it with all it has, and after."""
+
+
+def events_of(data, motion, lasts=4):
+    return let_go(motion.dtheta[:, KNEE], known_speed(data, KNEE), lasts)
+
+
+def with_stiction(data, sizes):
+    """The same passes with a torque of its own in each, about the instants at which the knee lets go."""
+    torque = data.period_tau_motor.copy()
+    for motion, size, tau in zip(data.period_motions, sizes, torque, strict=True):
+        for k, direction in events_of(data, motion):
+            tau[np.arange(k - BEFORE, k + AFTER + 1) % len(tau), KNEE] += size * direction
+    return replace(data, period_tau_motor=torque, tau_motor=torque.mean(axis=0))
+
+
+def test_what_stood_and_keeps_moving_was_let_go():
+    speed = np.array([0.0, 0.0, 0.5, 0.6, 0.7, 0.3, 0.0, -0.4, -0.4, -0.4, -0.4, 0.05])
+    assert let_go(speed, 0.1, 2) == [(2, 1), (7, -1)]
+
+
+def test_what_only_twitches_was_not_let_go():
+    speed = np.array([0.0, 0.0, 0.5, 0.0, 0.0, -0.5, -0.5, -0.5, 0.0])
+    assert let_go(speed, 0.1, 2) == [(5, -1)]
+
+
+def test_what_turns_without_standing_was_not_let_go():
+    assert let_go(np.array([-0.5, -0.5, -0.5, 0.5, 0.5, 0.5]), 0.1, 1) == []
+
+
+def test_what_is_let_go_at_the_end_of_a_period_moves_on_in_its_beginning():
+    assert let_go(np.array([0.5, 0.6, 0.0, 0.0, 0.4]), 0.1, 2) == [(4, 1)]
+
+
+@pytest.fixture(scope="module")
+def settled(jittery, laboratory):
+    """A leg without stiction, its model, and what its knee shows where it lets go."""
+    bench = Bench(jittery, laboratory.effects)
+    fit = settle(bench, bench.effects).fit
+    return bench, fit, breakaway_excess(bench, fit, "knee")
+
+
+def test_the_excess_is_the_torque_that_is_there(settled, laboratory):
+    bench, fit, before = settled
+    sizes = np.linspace(0.5, 1.5, bench.data.periods)
+    after = breakaway_excess(Bench(with_stiction(bench.data, sizes), laboratory.effects), fit, "knee")
+    assert len(after) == bench.data.periods
+    np.testing.assert_allclose(after - before, sizes, rtol=1e-9)
+
+
+def test_the_same_torque_the_other_way_is_no_stiction(settled, laboratory):
+    bench, fit, _ = settled
+    other = Bench(with_stiction(bench.data, -np.ones(bench.data.periods)), laboratory.effects)
+    assert breakaway_p(other, fit, "knee") == 1.0
+
+
+def test_friction_that_only_slides_is_never_exceeded(settled):
+    bench, fit, _ = settled
+    for joint in bench.robot.joint_names:
+        assert np.all(breakaway_excess(bench, fit, joint) < 0.0)
+        assert breakaway_p(bench, fit, joint) == 1.0
+
+
+def test_a_torque_that_comes_and_goes_with_the_passes_is_no_stiction(settled, laboratory):
+    """In the mean it is as large as what shows it, from pass to pass it is anything."""
+    bench, fit, before = settled
+    sizes = np.where(np.arange(bench.data.periods) % 4 == 0, 20.0, 0.0) - before
+    found = breakaway_excess(Bench(with_stiction(bench.data, sizes), laboratory.effects), fit, "knee")
+    assert np.mean(found) == pytest.approx(5.0)
+    assert LEVEL < breakaway_p(Bench(with_stiction(bench.data, sizes), laboratory.effects), fit, "knee") < 0.1
+
+
+def test_only_stiction_lets_go_late(settled, laboratory):
+    bench, fit, before = settled
+    held = Bench(with_stiction(bench.data, 1.0 - before), laboratory.effects)
+    assert lets_go_late(held, fit, make_effect("stribeck_friction", "knee"))
+    assert not lets_go_late(held, fit, make_effect("stribeck_friction", "hip"))
+    assert not lets_go_late(held, fit, make_effect("nonlinear_viscous_friction", "knee"))
+
+
+def test_a_small_excess_is_none(settled, laboratory):
+    """As certain as it may be: where friction turns, a torque of limited bandwidth overshoots."""
+    bench, fit, before = settled
+    sliding = fit.parameters["knee.coulomb_friction"]
+    for share, seen in ((0.08, False), (0.12, True)):
+        held = Bench(with_stiction(bench.data, share * sliding - before), laboratory.effects)
+        assert (breakaway_p(held, fit, "knee") <= LEVEL) == seen
+
+
+def test_few_passes_prove_nothing(settled, laboratory):
+    bench, fit, before = settled
+    data = with_stiction(bench.data, 1.0 - before)
+    few = replace(
+        data, period_motions=data.period_motions[:3], period_tau_motor=data.period_tau_motor[:3], places=(0, 1, 2)
+    )
+    assert breakaway_p(Bench(few, laboratory.effects), fit, "knee") == 1.0
+
+
+def test_a_joint_that_is_not_measured_is_refused(settled):
+    bench, fit, _ = settled
+    with pytest.raises(ValueError, match="no equation with the motor of joint 'toe'"):
+        breakaway_excess(bench, fit, "toe")
