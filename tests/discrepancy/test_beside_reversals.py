@@ -61,9 +61,13 @@ def least(jittery, laboratory):
     return next(d for d in found if (d.effect, d.joint) == ("stribeck_friction", "knee"))
 
 
-def test_a_search_and_its_confirmation_do_not_see_what_acts_beside_reversals_only(sticking):
+@pytest.mark.parametrize(("late", "seen"), [(False, []), (True, [("stribeck_friction", "knee")])])
+def test_a_search_sees_what_acts_beside_reversals_only_by_what_lets_go_late(sticking, monkeypatch, late, seen):
     bench, _ = sticking
-    assert named(confirm(bench, search(bench, bench.effects)).selection) == []
+    if not late:
+        for module in ("search", "confirm"):
+            monkeypatch.setattr(f"sea_ident.discrepancy.{module}.lets_go_late", lambda *_: False)
+    assert named(confirm(bench, search(bench, bench.effects)).selection) == seen
 
 
 def test_the_samples_beside_reversals_show_it(sticking):
