@@ -12,6 +12,7 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Column, Effect
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.regressor import build_total, model_columns
 from sea_ident.robot import Robot
 
@@ -125,6 +126,7 @@ def random_motion(robot: Robot, samples: int, seed: int = 0) -> Motion:
     )  # fmt: skip
 
 
+@one_thread
 def find_base_parameters(
     robot: Robot,
     effects: Sequence[Effect],
@@ -208,7 +210,7 @@ def group_columns(columns: tuple[Column, ...], triangle: FloatArray, tolerance: 
             f"the rank {rank} hangs on the tolerance: the singular values {singular_values[rank - 1]:.3g} and "
             f"{singular_values[rank]:.3g} beside it are less than a decade apart"
         )
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
         notes.append(text)
     return BaseParameters(base.columns, base.independent, grouping, singular_values, tolerance, tuple(notes))
 

@@ -14,6 +14,7 @@ from sea_ident.estimation import Agreement, Model
 from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.observations import friction_is_modelled
 from sea_ident.exceptions import RecordingError
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
 
@@ -85,6 +86,7 @@ class Validation:
         }
 
 
+@one_thread
 def validate(
     model: Model,
     recording: Recording | ProcessedRecording,

@@ -9,6 +9,7 @@ from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Gap, Verdict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.simulation import Controller
@@ -100,6 +101,7 @@ class ClosedGap:
         return "\n".join(lines)
 
 
+@one_thread
 def close_gap(
     model: Model,
     recording: Recording | ProcessedRecording,

@@ -13,6 +13,8 @@ from sea_ident.effects import Anchor, Column, Contribution, Effect, State, corre
 VARIANTS_KEPT = 3e8
 """Bytes of columns of candidates that are kept for the next search."""
 
+COLUMNS_KEPT = 3e8
+"""Bytes of columns of effects that are kept."""
 
 STATES_KEPT = 12
 """Motions, each corrected by other effects in the chain of signals, that are kept."""
@@ -39,6 +41,7 @@ class Columns:
         self.robot = data.robot
         self._states: dict[tuple[Effect, ...], State] = {}
         self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
+        self._bytes = 0
         self._labels: dict[Effect, tuple[Column, ...]] = {}
         self._places: dict[Key, IntArray] = {}
         self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
@@ -62,9 +65,12 @@ class Columns:
         signals = seen_by(effect, signals)
         key = (effect, signals)
         if key not in self._columns:
-            if len(self._columns) > 400:
+            if self._bytes > COLUMNS_KEPT:
                 self._columns.clear()
-            self._columns[key] = without_digits(self._spectra(effect.evaluate(self.state(signals)), signals))
+                self._bytes = 0
+            found = without_digits(self._spectra(effect.evaluate(self.state(signals)), signals))
+            self._columns[key] = found
+            self._bytes += found.nbytes
         return self._columns[key]
 
     def equations_of(self, effect: Effect) -> IntArray | None:

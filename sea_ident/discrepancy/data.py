@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.closing import SIGNALS, closing_weights, mean_of_periods
+from sea_ident.discrepancy.linear import span
 from sea_ident.effects import Contribution
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import Motion
@@ -346,23 +347,28 @@ def free_samples(left_out: NDArray[np.bool_], harmonics: int, alike: float = ALI
         alike: combinations that are weaker than this within the band are not freed [-].
 
     Returns:
-        (H + 1, E, m) spectra, each in one equation; neighbouring samples that look alike within the band share one.
+        (H + 1, E, m) orthonormal spectra, each in one equation; neighbouring samples that look alike within the band
+        share one.
     """
     samples, equations = left_out.shape
-    columns: list[NDArray[np.complex128]] = []
+    columns = [np.zeros((harmonics + 1, equations, 0), dtype=np.complex128)]
     for e in range(equations):
-        for group in _groups(left_out[:, e]):
-            phase = np.exp(-2j * np.pi * np.outer(np.arange(harmonics + 1), group) / samples) / samples
-            phase[1:] *= np.sqrt(2.0)
-            real = np.concatenate([phase.real, phase.imag])
-            left, strength, _ = np.linalg.svd(real, full_matrices=False)
-            for direction in left[:, strength > alike * strength[0]].T:
-                column = np.zeros((harmonics + 1, equations), dtype=np.complex128)
-                column[:, e] = direction[: harmonics + 1] + 1j * direction[harmonics + 1 :]
-                columns.append(column)
-    if not columns:
-        return np.zeros((harmonics + 1, equations, 0), dtype=np.complex128)
-    return np.stack(columns, axis=2)
+        own = [_alike_once(group, samples, harmonics, alike) for group in _groups(left_out[:, e])]
+        if own:
+            # once here, not in every noise floor: groups nearby are nearly dependent within the band
+            basis = span(np.concatenate(own, axis=1))
+            column = np.zeros((harmonics + 1, equations, basis.shape[1]), dtype=np.complex128)
+            column[:, e] = basis[: harmonics + 1] + 1j * basis[harmonics + 1 :]
+            columns.append(column)
+    return np.concatenate(columns, axis=2)
+
+
+def _alike_once(group: IntArray, samples: int, harmonics: int, alike: float) -> FloatArray:
+    """(2 H + 2, m) real and imaginary parts of what is within the band of a run of samples, alike ones once."""
+    phase = np.exp(-2j * np.pi * np.outer(np.arange(harmonics + 1), group) / samples) / samples
+    phase[1:] *= np.sqrt(2.0)
+    left, strength, _ = np.linalg.svd(np.concatenate([phase.real, phase.imag]), full_matrices=False)
+    return np.asarray(left[:, strength > alike * strength[0]], dtype=np.float64)
 
 
 def _groups(chosen: NDArray[np.bool_]) -> list[IntArray]:

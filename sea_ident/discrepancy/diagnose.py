@@ -38,6 +38,7 @@ from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.estimation import Model
 from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -46,6 +47,7 @@ from sea_ident.simulation import Controller
 Progress = Callable[[str, float], None]
 
 
+@one_thread
 def diagnose(
     model: Model,
     recording: Recording | ProcessedRecording,
@@ -142,7 +144,7 @@ def diagnose(
     diagnosis = replace(diagnosis, units=check.torque_units(robot))
     tell("done", 1.0)
     for text in diagnosis.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
     return diagnosis
 
 

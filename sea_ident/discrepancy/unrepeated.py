@@ -171,7 +171,7 @@ def diagnose_unrepeated(
         units=torque_units(robot),
     )  # fmt: skip
     for text in diagnosis.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
     return diagnosis
 
 

@@ -29,6 +29,7 @@ from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
 from sea_ident.estimation.update import updated
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, process
 from sea_ident.recordings import Recording
 from sea_ident.regressor import regressor_chunks
@@ -52,6 +53,7 @@ EXCERPT = 500
 """Samples of the mean period that a model keeps."""
 
 
+@one_thread
 def identify(
     robot: Robot,
     recording: Recording | ProcessedRecording,
@@ -160,7 +162,7 @@ def _doubts(model: Model) -> list[str]:
 def _reported(model: Model, found: list[str], first: int, notes: tuple[str, ...]) -> Model:
     """The model with its warnings, those that are new also raised."""
     for text in found[first:]:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
     return replace(model, warnings=tuple(dict.fromkeys(found)), notes=notes)
 
 

@@ -17,6 +17,7 @@ from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty, bartlett
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.variance import noise_from_curvature
 from sea_ident.robot import Robot
@@ -31,6 +32,7 @@ SPRING_SAMPLES = 20_000
 """Samples from which springs are identified at most."""
 
 
+@one_thread
 def identify_stream(
     robot: Robot,
     chunks: Iterable[tuple[Motion, FloatArray]],

@@ -11,11 +11,13 @@ from sea_ident.estimation.spring_result import SpringResult, Verdict
 from sea_ident.estimation.springs import spring_from_torque
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import filtering
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 
 
+@one_thread
 def identify_measured_springs(
     robot: Robot,
     recording: Recording,
@@ -68,6 +70,6 @@ def identify_measured_springs(
         factor = circular_factor([raw[:, count + k] - raw[:, k], motion.deflection[:, k]], [raw[:, 2 * count + k]])
         if factor is not None:
             result = replace(result, verdict=Verdict.CIRCULAR, note=circular_note(factor))
-            python_warnings.warn(f"{recording.source}: {name}: {result.note}", SeaIdentWarning, stacklevel=2)
+            python_warnings.warn(f"{recording.source}: {name}: {result.note}", SeaIdentWarning, stacklevel=3)
         results.append(result)
     return tuple(results)

@@ -17,6 +17,7 @@ from sea_ident.estimation.spring_result import SpringResult
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, process
 from sea_ident.processing.process import SMOOTHING
 from sea_ident.processing.variance import smooth_over_phase
@@ -26,6 +27,7 @@ from sea_ident.robot import Robot
 ROUNDS = 3
 
 
+@one_thread
 def identify_one_shot(
     robot: Robot,
     recording: Recording | ProcessedRecording,

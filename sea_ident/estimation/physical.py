@@ -21,6 +21,7 @@ from sea_ident.estimation.pseudo_inertia import (
     reference_pseudo_inertia,
 )
 from sea_ident.exceptions import IdentificationError
+from sea_ident.one_thread import one_thread
 from sea_ident.regressor import prior_parameters
 from sea_ident.robot import INERTIAL_NAMES, Robot
 
@@ -28,6 +29,7 @@ INTERIOR = 1e-5
 """Every pseudo-inertia is at least this share of that of the description, so that it can be simulated."""
 
 
+@one_thread
 def physical_parameters(
     model: Model, *, pull: Pull = Pull.ENTROPIC, boxes: Mapping[str, Box] | None = None
 ) -> PhysicalParameters:

@@ -16,6 +16,7 @@ from sea_ident.estimation.spring_verdict import held_out_rms, verdict_of
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.harmonics import differentiate
 
@@ -29,6 +30,7 @@ SHARE = 0.1
 """Part of a column in the combination that vanishes from which on it is named as one of the same [-]."""
 
 
+@one_thread
 def identify_springs(
     model: "Model", processed: ProcessedRecording, *, unknown_zero: Sequence[str] = ()
 ) -> tuple[SpringResult, ...]:

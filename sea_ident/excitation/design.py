@@ -21,6 +21,7 @@ from sea_ident.excitation.result import Excitation
 from sea_ident.excitation.springs import PredictedMotors
 from sea_ident.excitation.starts import climb_from_starts
 from sea_ident.excitation.states import Sampling
+from sea_ident.one_thread import one_thread
 from sea_ident.robot import Limits, Robot
 
 _MOST_SAMPLES = 1_000_000
@@ -31,6 +32,7 @@ _GROWTH = 1.25
 """Of the time of a step with the number of coefficients (three joints, 10 to 249 harmonics)."""
 
 
+@one_thread
 def design_excitation(
     robot: Robot,
     *,
@@ -118,7 +120,7 @@ def design_excitation(
     if found.interrupted:
         notes.append("interrupted; this is the best so far")
     for note in notes[said:]:
-        python_warnings.warn(note, SeaIdentWarning, stacklevel=2)
+        python_warnings.warn(note, SeaIdentWarning, stacklevel=3)
     ramps = (None, None) if ramp is None else problem.ramps(found.coefficients, ramp)
     seconds = time.perf_counter() - begin
     return problem.result(found.coefficients, ramps, starts, found.values, seed, seconds, tuple(notes))
@@ -147,7 +149,7 @@ def _warn_of_size(n: int, harmonics: int, highest: float, notes: list[str]) -> i
         f"{harmonics} harmonics of {n} joints are {coefficients} coefficients, up to {highest:.3g} Hz: a step takes "
         f"about {longer:.0f} times as long as with 10 harmonics. Take fewer, or interrupt to have the best so far"
     )
-    python_warnings.warn(notes[-1], SeaIdentWarning, stacklevel=3)
+    python_warnings.warn(notes[-1], SeaIdentWarning, stacklevel=4)
     return len(notes)
 
 

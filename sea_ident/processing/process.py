@@ -9,6 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
 from sea_ident.processing.encoder_steps import encoder_steps
 from sea_ident.processing.processed import ProcessedRecording
@@ -20,6 +21,7 @@ SMOOTHING = 0.5
 """Width [s] of the window over which the torque variance is smoothed."""
 
 
+@one_thread
 def process(
     recording: Recording,
     robot: Robot,
@@ -65,10 +67,11 @@ def process(
     else:
         result = _periodic(recording, robot, signals, uniform, period, link_harmonics, motor_harmonics, smoothing)
     for text in result.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
     return result
 
 
+@one_thread
 def filter_recording(recording: Recording, robot: Robot, *, cutoff: float | None = None) -> ProcessedRecording:
     """Process a recording as one stretch, whether it repeats itself or not.
 
@@ -85,7 +88,7 @@ def filter_recording(recording: Recording, robot: Robot, *, cutoff: float | None
     """
     result = _not_periodic(recording, robot, read_signals(recording, robot), recording.is_uniform, cutoff)
     for text in result.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=2)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
     return result
 
 

@@ -10,6 +10,7 @@ from sea_ident.arguments import expect
 from sea_ident.effects import measured_signals
 from sea_ident.exceptions import SimulationError
 from sea_ident.motion import FourierSeries, Motion
+from sea_ident.one_thread import one_thread
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation.controller import Controller, Drive, VelocityController
@@ -38,6 +39,7 @@ class Settling:
     longest: int = 10
 
 
+@one_thread
 def simulate(
     robot: Robot,
     reference: FourierSeries | HasSeries | Motion,
