@@ -17,7 +17,7 @@ from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Effect
 
-PARTS_KEPT = 2e8
+PARTS_KEPT = 1e8
 """Bytes of columns that are kept."""
 
 
