@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
@@ -23,6 +24,9 @@ from sea_ident.discrepancy.periods import Periods
 from sea_ident.discrepancy.whitening import Whitening
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
+
+EVALUATED_ON = ("robot", "motion", "period_motions", "channels", "equations", "tau_motor", "period_tau_motor")
+"""What of a recording effects are evaluated on."""
 
 NOISE_ROUNDS = 2
 """Noise floors in turn: what a model takes up of the scatter depends on the floor that it is weighted by. No more than
@@ -55,11 +59,25 @@ class Bench(ParameterFits):
     Args:
         data: the recording.
         effects: the model that is diagnosed.
+        evaluated: what was evaluated on the recording already.
     """
 
-    def __init__(self, data: PeriodData, effects: Sequence[Effect]) -> None:
-        super().__init__(data, effects)
-        self._periods = Periods(data)
+    def __init__(self, data: PeriodData, effects: Sequence[Effect], evaluated: Evaluated | None = None) -> None:
+        super().__init__(data, effects, evaluated)
+        self._periods = Periods(data, self._evaluated.bodies)
+
+    def comparing(self, data: PeriodData) -> "Bench":
+        """The same model and recording on another bench that compares other samples, or knows more of it.
+
+        What does not depend on that is evaluated once for both.
+
+        Raises:
+            ValueError: it is not the same recording.
+        """
+        same = all(getattr(data, name) is getattr(self.data, name) for name in EVALUATED_ON)
+        if not same or data.harmonics != self.data.harmonics:
+            raise ValueError(f"{data.source} is another recording, or other periods of it")
+        return Bench(data, self.effects, self._evaluated)
 
     def refine(
         self,

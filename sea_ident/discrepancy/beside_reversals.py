@@ -40,7 +40,7 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     """
     if bench.data.caution != USUAL or bench.data.periods < FEWEST_PERIODS or unexplained(confirmed):
         return bench, confirmed
-    near = Bench(compared_beside_reversals(bench.data), bench.effects)
+    near = bench.comparing(compared_beside_reversals(bench.data))
     before = confirmed.selection
     now = settle_again(near, before.final.fit)
     added: list[float] = []

@@ -1,10 +1,11 @@
 """Columns of effects on one recording, as spectra; what was computed once is kept."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from sea_ident._typing import IntArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.data import PeriodData, equation_row, spectrum
 from sea_ident.discrepancy.free_shapes import moving, seen_by, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
@@ -29,32 +30,55 @@ DIGITS = 1e-7
 """Share of the largest column of an effect below which another is nothing but the digits of a description [-]."""
 
 
+@dataclass(eq=False)
+class Evaluated:
+    """What was evaluated on a recording, whichever of its samples are compared.
+
+    Attributes:
+        states: robot and mean motion behind effects in the chain of signals.
+        columns: spectra (H + 1, E, k) of effects behind these.
+        size: of the columns [bytes].
+        labels: of the columns of effects.
+        places: (e,) equations that effects of a kind act in at a place.
+        variants: equations (e,) and columns (H + 1, e, v, k) of an effect in several shapes.
+        deflections: spectra (H,) of every link equation behind effects in the chain of signals.
+        bodies: state of the mean, then of every period, and their rows (N', 2 n, k) of bodies and rotors.
+    """
+
+    states: dict[tuple[Effect, ...], State] = field(default_factory=dict)
+    columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = field(default_factory=dict)
+    size: int = 0
+    labels: dict[Effect, tuple[Column, ...]] = field(default_factory=dict)
+    places: dict[Key, IntArray] = field(default_factory=dict)
+    variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = field(
+        default_factory=dict
+    )
+    deflections: dict[tuple[Effect, ...], dict[int, ComplexArray]] = field(default_factory=dict)
+    bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = field(default_factory=dict)
+
+
 class Columns:
     """Evaluates effects on one recording.
 
     Args:
         data: the recording.
+        evaluated: what was evaluated on it already, to go on with.
     """
 
-    def __init__(self, data: PeriodData) -> None:
+    def __init__(self, data: PeriodData, evaluated: Evaluated | None = None) -> None:
         self.data = data
         self.robot = data.robot
-        self._states: dict[tuple[Effect, ...], State] = {}
-        self._columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = {}
-        self._bytes = 0
-        self._labels: dict[Effect, tuple[Column, ...]] = {}
-        self._places: dict[Key, IntArray] = {}
-        self._variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = {}
+        self._evaluated = Evaluated() if evaluated is None else evaluated
 
     def state(self, effects: Sequence[Effect]) -> State:
         """Robot and mean motion, with the errors of the sensors taken out that the effects describe."""
         signals = moving(signal_effects(effects))
-        if signals not in self._states:
-            if len(self._states) > STATES_KEPT:
-                self._states.pop(next(k for k in self._states if k))
+        if signals not in self._evaluated.states:
+            if len(self._evaluated.states) > STATES_KEPT:
+                self._evaluated.states.pop(next(k for k in self._evaluated.states if k))
             motion = corrected_motion(self.robot, signals, self.data.motion)
-            self._states[signals] = State(self.robot, motion, self.data.channels)
-        return self._states[signals]
+            self._evaluated.states[signals] = State(self.robot, motion, self.data.channels)
+        return self._evaluated.states[signals]
 
     def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect within a model."""
@@ -64,18 +88,18 @@ class Columns:
         """(H + 1, E, k) columns of one effect behind the effects in the chain of signals of its model."""
         signals = seen_by(effect, signals)
         key = (effect, signals)
-        if key not in self._columns:
-            if self._bytes > COLUMNS_KEPT:
-                self._columns.clear()
-                self._bytes = 0
+        if key not in self._evaluated.columns:
+            if self._evaluated.size > COLUMNS_KEPT:
+                self._evaluated.columns.clear()
+                self._evaluated.size = 0
             found = without_digits(self._spectra(effect.evaluate(self.state(signals)), signals))
-            self._columns[key] = found
-            self._bytes += found.nbytes
-        return self._columns[key]
+            self._evaluated.columns[key] = found
+            self._evaluated.size += found.nbytes
+        return self._evaluated.columns[key]
 
     def equations_of(self, effect: Effect) -> IntArray | None:
         """Equations (e,) that an effect acts in, None where none of its kind at its place was evaluated yet."""
-        return self._places.get(effect_key(effect))
+        return self._evaluated.places.get(effect_key(effect))
 
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
         """Columns of one effect in all its variants.
@@ -85,12 +109,12 @@ class Columns:
         """
         signals = seen_by(variants[0], signal_effects(effects))
         key = (tuple(variants), signals)
-        if key not in self._variants:
-            if sum(spectra.nbytes for _, spectra in self._variants.values()) > VARIANTS_KEPT:
-                self._variants.clear()
-            self._variants[key] = self.spectra_of_variants(variants, signals)
-            self._places[effect_key(variants[0])] = self._variants[key][0]
-        return self._variants[key]
+        if key not in self._evaluated.variants:
+            if sum(spectra.nbytes for _, spectra in self._evaluated.variants.values()) > VARIANTS_KEPT:
+                self._evaluated.variants.clear()
+            self._evaluated.variants[key] = self.spectra_of_variants(variants, signals)
+            self._evaluated.places[effect_key(variants[0])] = self._evaluated.variants[key][0]
+        return self._evaluated.variants[key]
 
     def spectra_of_variants(
         self, variants: Sequence[Effect], effects: Sequence[Effect]
@@ -138,11 +162,11 @@ class Columns:
 
     def labels_of(self, effect: Effect) -> tuple[Column, ...]:
         """(k,) labels of the columns of one effect."""
-        if effect not in self._labels:
-            if len(self._labels) > LABELS_KEPT:
-                self._labels.clear()
-            self._labels[effect] = effect.columns(self.robot)
-        return self._labels[effect]
+        if effect not in self._evaluated.labels:
+            if len(self._evaluated.labels) > LABELS_KEPT:
+                self._evaluated.labels.clear()
+            self._evaluated.labels[effect] = effect.columns(self.robot)
+        return self._evaluated.labels[effect]
 
     def counts(self, effects: Sequence[Effect]) -> list[int]:
         """Number of columns of every effect."""

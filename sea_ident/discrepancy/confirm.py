@@ -71,7 +71,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     Returns:
         What is left.
     """
-    away = Bench(replace(away_from_reversals(bench.data), alike=BARELY_SEEN), bench.effects)
+    away = bench.comparing(replace(away_from_reversals(bench.data), alike=BARELY_SEEN))
     start = settle_again(away, selection.start.fit)
     final = settle_again(away, selection.final.fit) if selection.added else start
     weak = []
@@ -118,7 +118,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     data = away_from_reversals(bench.data, FAR)
     if np.any(np.mean(data.left_out, axis=0) > MOST_LEFT_OUT):
         return None
-    far = Bench(data, bench.effects)
+    far = bench.comparing(data)
     before = settle_again(far, confirmed.final.fit)
     first = before.fit
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
@@ -131,6 +131,6 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):
         return None
     # with the usual samples freed: what a judge of the model would take out is just what must not be forgotten here
-    usual = Bench(away_from_reversals(bench.data), bench.effects)
+    usual = bench.comparing(away_from_reversals(bench.data))
     left = remainder_share(usual, settle_again(usual, fit))
     return Confirmed(found, far, found.start, found.final, left)

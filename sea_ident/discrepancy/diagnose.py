@@ -201,7 +201,7 @@ def _searched_mean(
 def _less(bench: Bench, fit: Fit, trends: TrendTest, temperature: FloatArray | None) -> Bench:
     if not trends.trends:
         return bench
-    return Bench(replace(bench.data, known=within_periods(bench, fit, trends.trends, temperature)), bench.effects)
+    return bench.comparing(replace(bench.data, known=within_periods(bench, fit, trends.trends, temperature)))
 
 
 def _names(trends: TrendTest) -> set[tuple[str, str | None]]:

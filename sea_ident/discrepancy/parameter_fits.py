@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray, IntArray
+from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes
@@ -32,10 +33,11 @@ class ParameterFits(Tangents):
     Args:
         data: the recording.
         effects: the model that is diagnosed.
+        evaluated: what was evaluated on the recording already.
     """
 
-    def __init__(self, data: PeriodData, effects: Sequence[Effect]) -> None:
-        super().__init__(data)
+    def __init__(self, data: PeriodData, effects: Sequence[Effect], evaluated: Evaluated | None = None) -> None:
+        super().__init__(data, evaluated)
         self.effects = tuple(effects)
         self._target = spectrum(data.target(data.tau_motor), data.harmonics)
         self._left_out = data.left_out

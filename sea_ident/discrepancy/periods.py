@@ -23,14 +23,15 @@ class Periods:
 
     Args:
         data: the recording.
+        bodies: by effects in the chain of signals, the states and rows of bodies that were evaluated on it already.
     """
 
-    def __init__(self, data: PeriodData) -> None:
+    def __init__(self, data: PeriodData, bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]]) -> None:
         self.data = data
         self.robot = data.robot
         stride = max(1, data.samples // (PERIOD_SAMPLES * data.reach + 1))
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
-        self._period_bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = {}
+        self._period_bodies = bodies
 
     def residuals(self, fit: Fit) -> ComplexArray:
         """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""

@@ -9,7 +9,7 @@ import pinocchio as pin
 from scipy.signal import resample
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.columns import Columns
+from sea_ident.discrepancy.columns import Columns, Evaluated
 from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import distance, moved, signal_effects
@@ -35,11 +35,11 @@ class Tangents(Columns):
 
     Args:
         data: the recording.
+        evaluated: what was evaluated on it already.
     """
 
-    def __init__(self, data: PeriodData) -> None:
-        super().__init__(data)
-        self._shown: dict[tuple[Effect, ...], dict[int, ComplexArray]] = {}
+    def __init__(self, data: PeriodData, evaluated: Evaluated | None = None) -> None:
+        super().__init__(data, evaluated)
         self._stiffness: tuple[Fit, FloatArray] | None = None
         self._derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
@@ -81,15 +81,16 @@ class Tangents(Columns):
         As right encoders show it, for their noise is to be measured in it. What one shows late is no deflection: over
         that a spring would seem softer than it is.
         """
-        if signals not in self._shown:
-            if len(self._shown) > SIGNALS_KEPT:
-                self._shown.clear()
+        shown = self._evaluated.deflections
+        if signals not in shown:
+            if len(shown) > SIGNALS_KEPT:
+                shown.clear()
             motion = self.data.motion
             for signal in signals:
                 motion = signal.read(self.robot, motion)
             deflection = spectrum(motion.deflection, self.data.harmonics)[1:]
-            self._shown[signals] = {e: deflection[:, self.data.equations[e].index] for e in self.links}
-        return self._shown[signals]
+            shown[signals] = {e: deflection[:, self.data.equations[e].index] for e in self.links}
+        return shown[signals]
 
     def slopes_of(self, change: ComplexArray, equations: Sequence[int], effects: Sequence[Effect]) -> FloatArray:
         """(E, k) slope over the deflection of a torque (H + 1, E, k) of the springs of some links within a model."""

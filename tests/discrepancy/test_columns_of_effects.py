@@ -4,10 +4,18 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.check import subset
 from sea_ident.discrepancy.columns import without_digits
-from sea_ident.discrepancy.data import equation_row, period_data, spectrum, wide_processing
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.data import (
+    away_from_reversals,
+    equation_row,
+    period_data,
+    spectrum,
+    wide_processing,
+)
+from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import State, base_effects, corrected_motion, make_effect, spring_effects
+from sea_ident.effects.rigid_bodies import RigidBodies
 from sea_ident.regressor import prior_parameters
 from sea_ident.robot import load_robot
 
@@ -64,3 +72,21 @@ def test_what_only_delays_a_torque_changes_no_motion(laboratory):
     assert states[0] is states[1] is bench.state(bench.effects)
     offset = make_effect("encoder_offset", "knee", offset=0.01)
     assert bench.state((*bench.effects, offset, delays[0])) is not states[0]
+
+
+def test_benches_that_compare_other_samples_of_a_recording_evaluate_once(nothing_missing, monkeypatch):
+    bench, start = nothing_missing
+    alone = Bench(away_from_reversals(bench.data), bench.effects)
+    other = bench.comparing(away_from_reversals(bench.data))
+    expected = settle_again(alone, start.fit)
+    monkeypatch.setattr(RigidBodies, "evaluate", None)
+    found = settle_again(other, start.fit)
+    assert found.fit.statistic == expected.fit.statistic
+    np.testing.assert_array_equal(found.fit.values, expected.fit.values)
+    assert not np.array_equal(other.data.left_out, bench.data.left_out)
+
+
+def test_another_recording_is_no_other_samples_of_it(nothing_missing, laboratory):
+    bench, _ = nothing_missing
+    with pytest.raises(ValueError, match="is another recording, or other periods of it"):
+        bench.comparing(subset(bench.data, [0, 1, 2, 3]))
