@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from sea_ident.effects import Effect, JointEffect, Shape
+from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
@@ -54,7 +55,8 @@ def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
 def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
     """Shape parameters that a fit is free to change, and amounts of signal effects.
 
-    A push on the very centre of mass of a link stays there, and a saturation by a cube one.
+    A push on the very centre of mass of a link stays there, a saturation by a cube one, and both sides of a spring with
+    a kink elsewhere than at rest straight.
     """
     found: list[tuple[int, Shape]] = []
     for position, effect in enumerate(effects):
@@ -62,6 +64,8 @@ def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
         if isinstance(effect, ExternalForce) and not any(getattr(effect, name) for name in POINT):
             stay = (*stay, *POINT)
         if isinstance(effect, TorqueSaturation) and effect.exponent == CUBE:
+            stay = (*stay, "exponent")
+        if isinstance(effect, AsymmetricSpring) and effect.kink != 0.0:
             stay = (*stay, "exponent")
         shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
         found.extend((position, shape) for shape in shapes if shape.name not in stay)

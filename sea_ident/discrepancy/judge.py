@@ -152,8 +152,10 @@ def penalty(effect: Effect, bench: Bench) -> float:
 
     A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one.
     """
-    # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points
+    # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points,
+    # and where a kink is; its sides are straight then
     found = len(effect.shapes) if isinstance(effect, ExternalForce) else 0
+    found += isinstance(effect, AsymmetricSpring) and effect.kink != 0.0
     shapes = found + len(free_shapes((effect,)))
     count = len(effect.columns(bench.robot)) + shapes
     price = count * float(np.log(2.0 * len(bench.data.equations) * bench.data.harmonics))

@@ -12,6 +12,7 @@ from sea_ident.discrepancy.edges import with_sharp_edges
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Shape
 from sea_ident.effects.backlash import Backlash
@@ -91,6 +92,7 @@ def refitted(
         best = from_described_springs(bench, best, len(before), noise, start)
     if isinstance(effect, SpringEffect):
         best = _in_its_spring(bench, best, noise, len(before), beat)
+        best = at_its_kink(bench, best, noise, len(before))
     return with_sharp_edges(bench, best, noise, len(before), beat)
 
 

@@ -26,6 +26,7 @@ from sea_ident.discrepancy.judge import (
     torque_change,
     torque_changes,
 )
+from sea_ident.discrepancy.kinks import with_their_kinks
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.refit import of_every_kind, refitted
@@ -192,10 +193,11 @@ def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: C
 
 
 def _formed(bench: Bench, now: Settled) -> Settled:
-    """Pushes with their edges where they belong, saturation by the power that it needs."""
-    sharp = sharpened(bench, now.fit, now.noise, len(bench.effects))
-    now = now if sharp is now.fit else settle_again(bench, sharp)
-    return with_their_powers(bench, now, len(bench.effects))
+    """Pushes with their edges and springs with their kinks where they belong, saturation by the power that it needs."""
+    first = len(bench.effects)
+    sharp = sharpened(bench, now.fit, now.noise, first)
+    now = with_their_kinks(bench, now if sharp is now.fit else settle_again(bench, sharp), first)
+    return with_their_powers(bench, now, first)
 
 
 def _settled(bench: Bench, now: Settled) -> Settled:

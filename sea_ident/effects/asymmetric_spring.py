@@ -14,14 +14,15 @@ from sea_ident.robot import Robot
 KINKS = (-0.3, -0.15, 0.15, 0.3)
 """Places of a kink that a search tries beside none, as shares of the largest deflection of the motion [-]."""
 
-BEFORE_IT = 0.9
-"""Where the motion deflects to one side only: place of a kink that it just does not reach, and of one as far to the
-other side, as a share of its least deflection [-]. The sides differ least there for the same torque on the motion."""
+OUT_OF_REACH = (0.9, 0.6, 0.3)
+"""Where the motion deflects to one side only: places of a kink between rest and the motion, as shares of its least
+deflection [-]. The sides differ least, for the same torque on the motion, at the first; other motions reach the last
+less."""
 
 
 @dataclass(frozen=True)
 class AsymmetricSpring(SpringEffect):
-    """K |theta - q - d|^p.
+    """K (|theta - q - d|^p - |d|^p): at rest there is no torque, wherever the kink is.
 
     Attributes:
         joint: joint at which it acts.
@@ -48,18 +49,19 @@ class AsymmetricSpring(SpringEffect):
     def variants(self, state: State) -> tuple["AsymmetricSpring", ...]:
         """Exponents with the kink where the spring is at rest, and kinks elsewhere between two straight sides.
 
-        A kink that the motion does not reach is tried only where it does not pass the rest of the spring either.
+        A kink that the motion does not pass is tried only between it and the rest of the spring: beyond rest it does
+        nothing but change the stiffness.
         """
         deflection = state.motion.deflection[:, state.robot.index(self.required_joint)]
-        low, high = float(deflection.min()), float(deflection.max())
+        low, high = min(float(deflection.min()), 0.0), max(float(deflection.max()), 0.0)
         kinks = [share * max(-low, high) for share in KINKS]
-        if low * high > 0.0:
-            nearest = BEFORE_IT * min(abs(low), abs(high))
-            kinks.extend((-nearest, nearest))
+        least = deflection[np.argmin(np.abs(deflection))]
+        if low == 0.0 or high == 0.0:
+            kinks.extend(share * float(least) for share in OUT_OF_REACH)
         exponents = (float(exponent) for exponent in self.shapes[0].grid())
         return (
             *(replace(self, exponent=exponent, kink=0.0) for exponent in exponents),
-            *(replace(self, exponent=1.0, kink=kink) for kink in kinks if low * high > 0.0 or low < kink < high),
+            *(replace(self, exponent=1.0, kink=kink) for kink in kinks if low < kink < high),
         )
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
@@ -74,5 +76,6 @@ class AsymmetricSpring(SpringEffect):
         return slope
 
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """|theta - q - d|^p."""
-        return (np.abs(theta - q - self.kink) ** self.exponent)[:, None]
+        """|theta - q - d|^p - |d|^p."""
+        column: FloatArray = np.abs(theta - q - self.kink) ** self.exponent - abs(self.kink) ** self.exponent
+        return column[:, None]

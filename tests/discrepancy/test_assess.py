@@ -42,7 +42,7 @@ def written_as(preloaded, effect):
 
 SAME_TORQUE = [
     make_effect("backlash", "hip", half_width=0.0011),
-    make_effect("asymmetric_spring", "hip", kink=-0.01),
+    make_effect("asymmetric_spring", "hip", kink=0.001),
     make_effect("asymmetric_spring", "hip", kink=0.003),
 ]
 

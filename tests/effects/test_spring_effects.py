@@ -55,14 +55,28 @@ def test_widths_of_play_that_a_search_tries_leave_no_gap_where_the_deflection_ke
     assert len(fitting) >= 2
 
 
-def test_a_kink_that_is_not_passed_is_an_offset_and_a_stiffer_spring():
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("kink", [-0.01, 0.0, 0.01])
+def test_a_spring_with_two_sides_rests_without_torque_wherever_its_kink_is(kink, exponent):
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=5, seed=4)
+    d = np.array([-0.02, -0.01, 0.0, 0.01, 0.02])
+    theta = motion.q.copy()
+    theta[:, 1] += d
+    spring = make_effect("asymmetric_spring", "knee", kink=kink, exponent=exponent)
+    column = spring.evaluate(State(leg, replace(motion, theta=theta))).motor[:, 1, 0]
+    np.testing.assert_allclose(column, np.abs(d - kink) ** exponent - np.abs(kink) ** exponent, atol=1e-12)
+    assert column[2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_kink_that_is_not_passed_is_an_offset_and_a_stiffer_spring(sign):
     leg = load_robot("exo_leg")
     motion = random_motion(leg, samples=200, seed=4)
-    kink = float(motion.deflection[:, 1].min()) - 0.01
-    column = make_effect("asymmetric_spring", "knee", kink=kink).evaluate(State(leg, motion)).motor[:, 1, 0]
-    np.testing.assert_allclose(column, motion.deflection[:, 1] - kink, rtol=1e-12)
-    passed = make_effect("asymmetric_spring", "knee", kink=kink + 0.02).evaluate(State(leg, motion)).motor[:, 1, 0]
-    np.testing.assert_allclose(passed, np.abs(motion.deflection[:, 1] - kink - 0.02), rtol=1e-12)
+    theta = motion.q + sign * (0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None])
+    state = State(leg, replace(motion, theta=theta))
+    column = make_effect("asymmetric_spring", "knee", kink=0.01 * sign).evaluate(state).motor[:, 1, 0]
+    np.testing.assert_allclose(column, sign * state.motion.deflection[:, 1] - 0.02, rtol=1e-9)
 
 
 def test_a_spring_of_two_straight_sides_pushes_back_on_both():
@@ -106,14 +120,16 @@ def test_ends_that_hardly_give_way_are_hard():
     np.testing.assert_allclose(*torques, atol=1e-8)
 
 
-def test_a_kink_just_out_of_reach_is_tried_on_both_sides_where_the_deflection_keeps_its_sign():
+def test_kinks_that_the_motion_does_not_pass_are_tried_between_it_and_rest():
     leg = load_robot("exo_leg")
     motion = random_motion(leg, samples=200, seed=4)
     for sign in (1.0, -1.0):
         theta = motion.q + sign * (0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None])
         springs = make_effect("asymmetric_spring", "knee").variants(State(leg, replace(motion, theta=theta)))
-        near = [spring.kink for spring in springs if 0.01 < abs(spring.kink) < 0.02]
-        assert min(near) < 0.0 < max(near)
+        kinks = [sign * spring.kink for spring in springs if spring.kink != 0.0]
+        assert min(kinks) > 0.0
+        assert np.sum(np.array(kinks) < 0.02) == 5  # three out of reach, and 0.15 and 0.3 of the largest
+        assert max(kinks) < 0.02
     passed = make_effect("asymmetric_spring", "knee").variants(State(leg, motion))
     largest = np.max(np.abs(motion.deflection[:, 1]))
     assert {round(abs(spring.kink) / largest, 9) for spring in passed} == {0.0, 0.15, 0.3}
