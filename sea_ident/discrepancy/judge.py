@@ -41,6 +41,12 @@ SMALL_BESIDE = 0.05
 SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 """Parameters of the law of a spring with two equal sides."""
 
+SPEED_LAWS = ("stribeck_friction", "nonlinear_viscous_friction")
+"""Frictions that are a function of nothing but the speed of their motor, ..."""
+
+OWN_AMOUNT = 3.0
+"""... and standard deviations that each must have of its own where there are two of one motor."""
+
 DRIVES = 0.1
 """Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise may do [-]."""
 
@@ -228,6 +234,21 @@ def brakes(bench: Bench, fit: Fit, position: int) -> bool:
         return True
     torque = effect.evaluate(bench.state(fit.effects)).motor @ np.array([fit.parameters[effect.parameter_name()]])
     return bool(-dry < DRIVES * float(np.max(np.abs(torque))))
+
+
+def bends_another(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether a friction only bends the curve of another one over the same speed: its own amount is not known.
+
+    Two laws of the library together take the form of any curve. Where the curve is that of neither, they do so by large
+    amounts that nearly cancel, and none is an effect of its own.
+    """
+    position %= len(fit.effects)
+    effect = fit.effects[position]
+    laws = [e for e in fit.effects if e.name in SPEED_LAWS and e.joint == effect.joint]
+    if effect.name not in SPEED_LAWS or len(laws) < 2:
+        return False
+    start = sum(bench.counts(fit.effects)[:position])
+    return abs(float(fit.values[start])) < OWN_AMOUNT * fit.std(start)
 
 
 def physical(bench: Bench, fit: Fit, position: int) -> bool:

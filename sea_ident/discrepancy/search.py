@@ -16,6 +16,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
     at_a_bound,
+    bends_another,
     flat_steps,
     own_torque,
     penalty,
@@ -360,9 +361,10 @@ def _eliminate(
                 needed = needed and own > BEYOND_FORM * nameless
                 # a push comes and goes: nothing but another push can cancel it
                 needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
+            needed = needed and not bends_another(bench, fit, position)
             p_value = significance(loss, columns, tests, without, noise) if needed else 1.0
             scores.append((p_value, position, without))
-        worst = max(scores, key=lambda s: s[0])
+        worst = max(scores, key=lambda s: (s[0], -s[2].statistic))
         if worst[0] <= FAMILY_LEVEL:
             break
         now = settle_again(bench, worst[2])

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.diagnose import _out
-from sea_ident.discrepancy.judge import at_a_bound, dissipates, physical, pushes_back
+from sea_ident.discrepancy.judge import at_a_bound, bends_another, dissipates, physical, pushes_back
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
 
@@ -117,3 +118,27 @@ def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing
 )
 def test_a_width_that_ended_at_the_end_of_its_range_is_something_else(name, shapes, ended):
     assert at_a_bound(make_effect(name, "knee", **shapes)) is ended
+
+
+def test_of_two_frictions_over_one_speed_none_without_an_amount_is_its_own(nothing_missing):
+    bench, start = nothing_missing
+    stribeck, viscous = make_effect("stribeck_friction", "knee"), make_effect("nonlinear_viscous_friction", "knee")
+    other = make_effect("nonlinear_viscous_friction", "hip")
+
+    def bent(*effects):
+        fit = bench.fit((*start.fit.effects, *effects), start.noise, start=start.fit.parameters)
+        return [bends_another(bench, fit, k - len(effects)) for k in range(len(effects))]
+
+    assert bent(stribeck, viscous) == [True, True]
+    assert bent(stribeck, other) == [False, False]
+    assert bent(stribeck) == [False]
+    assert bent(viscous, make_effect("torque_offset", "knee")) == [False, False]
+
+
+def test_two_frictions_that_are_there_have_their_amounts(laboratory):
+    laws = [("stribeck_friction", "knee", [5.0], {"speed": 0.1}), ("nonlinear_viscous_friction", "knee", [9.0], {})]
+    bench = laboratory.bench(laboratory.record(laws, periods=10))
+    effects = [make_effect(name, joint, **shape) for name, joint, _, shape in laws]
+    start = settle(bench, bench.effects)
+    fit = bench.refine((*start.fit.effects, *effects), start.noise, start=start.fit.parameters, only=len(bench.effects))
+    assert [bends_another(bench, fit, k) for k in (-2, -1)] == [False, False]
