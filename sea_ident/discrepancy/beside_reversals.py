@@ -11,6 +11,7 @@ from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.search import BESIDE_ANOTHER, MOST_EFFECTS, SMALLEST_SHARE, next_effect
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
@@ -28,8 +29,8 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     """Look for friction in the samples beside reversals, where what was found explains all others.
 
     What the mean leaves there is not noise alone: the corner of friction that a band-limited speed misses, a motor that
-    friction holds. So an effect must explain a share of it as anywhere else, stand out of the scatter of the periods
-    along its own column, and be the best of the whole library.
+    friction holds. So that must be more than chance as a whole, and an effect must explain a share of it as anywhere
+    else, stand out of the scatter of the periods along its own column, and be the best of the whole library.
 
     Args:
         bench: the recording.
@@ -45,7 +46,7 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     now = settle_again(near, before.final.fit)
     added: list[float] = []
     begun: set[str | None] = set()
-    while before.added + len(added) < MOST_EFFECTS:
+    while before.added + len(added) < MOST_EFFECTS and lack_of_fit(near, now)[2] < LACK_LEVEL:
         few = [e for e in candidate_effects(near, now.fit.effects) if e.name in LIVE_BESIDE_REVERSALS]
         step = _next(near, now, before.start.fit, few)
         if step is None:
