@@ -59,10 +59,12 @@ def breakaway_p(bench: Bench, fit: Fit, joint: str) -> float:
         joint: of the motor.
 
     Returns:
-        By Student's t of the passes; 1 where the excess is small beside the sliding friction, or too few passes show
-        any.
+        By Student's t of the passes; 1 where the excess is small beside the sliding friction, the model has none to
+        compare with, or too few passes show any.
     """
-    sliding = abs(fit.parameters.get(f"{joint}.coulomb_friction", 0.0))
+    sliding = fit.parameters.get(f"{joint}.coulomb_friction", 0.0)
+    if sliding <= 0.0:
+        return 1.0
     excess = breakaway_excess(bench, fit, joint)
     if len(excess) < FEWEST_PASSES or float(np.mean(excess)) < LEAST_EXCESS * sliding:
         return 1.0

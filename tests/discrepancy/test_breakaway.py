@@ -104,6 +104,13 @@ def test_a_small_excess_is_none(settled, laboratory):
         assert (breakaway_p(held, fit, "knee") <= LEVEL) == seen
 
 
+def test_without_sliding_friction_there_is_nothing_to_compare_with(settled, laboratory):
+    bench, _, before = settled
+    held = Bench(with_stiction(bench.data, 1.0 - before), laboratory.effects)
+    slippery = [e for e in laboratory.effects if (e.name, e.joint) != ("coulomb_friction", "knee")]
+    assert breakaway_p(held, held.fit(slippery, None), "knee") == 1.0
+
+
 def test_few_passes_prove_nothing(settled, laboratory):
     bench, fit, before = settled
     data = with_stiction(bench.data, 1.0 - before)
