@@ -14,10 +14,10 @@ from sea_ident.robot import Robot
 KINKS = (-0.3, -0.15, 0.15, 0.3)
 """Places of a kink that a search tries beside none, as shares of the largest deflection of the motion [-]."""
 
-OUT_OF_REACH = (0.9, 0.6, 0.3)
+OUT_OF_REACH = (0.9, 0.45, 0.225, 0.1125)
 """Where the motion deflects to one side only: places of a kink between rest and the motion, as shares of its least
-deflection [-]. The sides differ least, for the same torque on the motion, at the first; other motions reach the last
-less."""
+deflection [-]. For the same torque on the motion the sides differ least at the first, and twice as much at every other,
+which another motion is less likely to pass."""
 
 
 @dataclass(frozen=True)
