@@ -122,3 +122,11 @@ def test_friction_smaller_than_the_smallest_is_not_seen_and_larger_is(jittery, l
     bench = Bench(with_friction(jittery, times * least.smallest, *shapes), laboratory.effects)
     _, confirmed = searched_beside_reversals(bench, confirm(bench, search(bench, bench.effects)))
     assert named(confirmed.selection) == seen
+
+
+def test_where_what_is_left_may_be_chance_nothing_is_looked_for(sticking, monkeypatch):
+    bench, _ = sticking
+    monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.lack_of_fit", lambda *_: (1.0, 1, 2e-3))
+    same, confirmed = searched_beside_reversals(bench, unsearched(bench))
+    assert same is bench
+    assert named(confirmed.selection) == []

@@ -8,7 +8,8 @@ import pytest
 from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.kinks import at_its_kink, with_their_kinks
-from sea_ident.discrepancy.search import search
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
 
@@ -79,3 +80,18 @@ def test_a_spring_with_a_kink_elsewhere_is_named_alone(kinked):
     selection = search(bench, bench.effects)
     assert [(e.name, e.joint) for e in selection.effects] == [("asymmetric_spring", "knee")]
     assert selection.effects[0].kink == pytest.approx(KINK, rel=0.02)
+
+
+def test_a_candidate_is_compared_with_its_kink_where_it_belongs(kinked):
+    bench, start = kinked
+    effect = make_effect("asymmetric_spring", "knee", kink=0.7 * KINK)
+    fit = refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters)
+    assert fit.effects[-1].kink == pytest.approx(KINK, rel=0.02)
+
+
+def test_what_was_found_beside_something_else_moves_its_kink(kinked):
+    bench, start = kinked
+    fit = beginning(bench, start, kink=0.7 * KINK)
+    begun = Selection(start, Settled(fit, start.noise), 1, (0.0,))
+    (effect,) = search(bench, bench.effects, begun).effects
+    assert effect.kink == pytest.approx(KINK, rel=0.02)

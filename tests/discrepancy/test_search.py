@@ -263,3 +263,16 @@ def test_what_promises_about_as_much_as_the_best_is_refitted_though_others_come_
     assert len(others) == 4
     assert chosen(1.0)
     assert not chosen(0.5)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, first):
+    """Whichever was found first; alone the other one is needed."""
+    bench, found = unequal
+    both = len(found.final.fit.effects)
+    bends = "sea_ident.discrepancy.search.bends_another"
+    monkeypatch.setattr(bends, lambda _, fit, __: len(fit.effects) == both)
+    effects = (*bench.effects, *(found.effects if first == 0 else found.effects[::-1]))
+    fit = bench.fit(effects, found.final.noise, start=found.final.fit.parameters)
+    begun = replace(found, final=Settled(fit, found.final.noise))
+    assert named(still_needed(bench, begun)) == {("torque_offset", "knee")}
