@@ -9,7 +9,7 @@ from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.kinks import at_its_kink, with_their_kinks
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import Selection, search
+from sea_ident.discrepancy.search import _formed, search
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
 
@@ -91,7 +91,5 @@ def test_a_candidate_is_compared_with_its_kink_where_it_belongs(kinked):
 
 def test_what_was_found_beside_something_else_moves_its_kink(kinked):
     bench, start = kinked
-    fit = beginning(bench, start, kink=0.7 * KINK)
-    begun = Selection(start, Settled(fit, start.noise), 1, (0.0,))
-    (effect,) = search(bench, bench.effects, begun).effects
-    assert effect.kink == pytest.approx(KINK, rel=0.02)
+    now = Settled(beginning(bench, start, kink=0.7 * KINK), start.noise)
+    assert _formed(bench, now).fit.effects[-1].kink == pytest.approx(KINK, rel=0.02)
