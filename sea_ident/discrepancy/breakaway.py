@@ -16,6 +16,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
+from sea_ident.discrepancy.periods import model_torque, torques_of
 from sea_ident.discrepancy.standing import known_speed
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
 from sea_ident.effects.coulomb_friction import CoulombFriction
@@ -81,8 +82,10 @@ def breakaway_excess(bench: Bench, fit: Fit, joint: str) -> FloatArray:
     data, robot = bench.data, bench.robot
     row = _motor_row(data, joint)
     index = data.equations[row].index
-    signals = moving(signal_effects(fit.effects))
-    motions = [corrected_motion(robot, signals, motion) for motion in data.period_motions]
+    signals = signal_effects(fit.effects)
+    motions = [corrected_motion(robot, moving(signals), motion) for motion in data.period_motions]
+    acting = torques_of(fit.effects, fit.parameters, robot)
+    nothing = Contribution(*np.zeros((2, data.samples, robot.n)))
     known = known_speed(data, index)
     smoothing = max(
         (e.smoothing for e in fit.effects if isinstance(e, CoulombFriction) and e.joint == joint), default=0.0
@@ -95,8 +98,8 @@ def breakaway_excess(bench: Bench, fit: Fit, joint: str) -> FloatArray:
     for motion, torque in zip(motions, data.period_tau_motor, strict=True):
         events = let_go(motion.dtheta[:, index], known, lasts)
         if events:
-            sliding = _sliding(motion, index, events, lasts, SLIDES * smoothing)
-            left = data.target(torque)[:, row] - data.rows(_modelled(bench, fit, sliding))[:, row]
+            state = State(robot, _sliding(motion, index, events, lasts, SLIDES * smoothing), data.channels)
+            left = data.target(torque)[:, row] - data.rows(model_torque(nothing, acting, signals, state))[:, row]
             at = [(np.arange(k, k + window + 1) % len(left), direction) for k, direction in events]
             found.append(float(np.mean([direction * np.mean(left[rows]) for rows, direction in at])))
     return np.array(found)
@@ -130,21 +133,3 @@ def _sliding(motion: Motion, index: int, events: Sequence[tuple[int, int]], arou
         rows = np.arange(k - around, k + around + 1) % len(dtheta)
         dtheta[rows, index] = direction * np.maximum(np.abs(dtheta[rows, index]), speed)
     return replace(motion, dtheta=dtheta)
-
-
-def _modelled(bench: Bench, fit: Fit, motion: Motion) -> Contribution:
-    """Torques (N, n) of a model on the motion of one pass."""
-    state = State(bench.robot, motion, bench.data.channels)
-    link = np.zeros((len(motion), bench.robot.n))
-    motor = np.zeros_like(link)
-    for effect in fit.effects:
-        values = np.array([fit.parameters[column.name] for column in effect.columns(bench.robot)])
-        if len(values):
-            part = effect.evaluate(state)
-            joint = slice(None) if part.joint is None else part.joint
-            link[:, joint] += part.link[:, joint] @ values
-            motor[:, joint] += part.motor[:, joint] @ values
-    part = Contribution(link, motor)
-    for signal in moving(signal_effects(fit.effects)):
-        part = signal.shifted(bench.robot, motion.time, part)
-    return part

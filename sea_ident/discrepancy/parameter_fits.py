@@ -7,8 +7,9 @@ import numpy as np
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.columns import Evaluated
-from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, free_samples, spectrum
+from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, spectrum
 from sea_ident.discrepancy.fit import Fit, Known
+from sea_ident.discrepancy.free_samples import free_samples
 from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, stacked

@@ -1,6 +1,6 @@
 """The periods of a recording in the light of a model."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from sea_ident.discrepancy.free_shapes import moving, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.robot import Robot
 
 PERIOD_SAMPLES = 2
 """Samples of a single period that its model torque is computed at, per harmonic of its motion."""
@@ -63,22 +64,12 @@ class Periods:
         own = np.concatenate(
             [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
         )
+        acting = torques_of(rest, fit.parameters, self.robot)
         model = []
-        values = [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in rest]
-        acting = [(e, each) for e, each in zip(rest, values, strict=True) if len(each)]
         for state, body_rows in self._body_rows(moving(signals), tuple(bodies)):
             rows = body_rows @ own
-            link = rows[:, : self.robot.n].copy()
-            motor = rows[:, self.robot.n :].copy()
-            for e, each in acting:
-                part = e.evaluate(state)
-                i = slice(None) if part.joint is None else part.joint
-                link[:, i] += part.link[:, i] @ each
-                motor[:, i] += part.motor[:, i] @ each
-            part = Contribution(link, motor)
-            for signal in signals:
-                part = signal.shifted(self.robot, state.motion.time, part)
-            model.append(data.rows(part))
+            body = Contribution(rows[:, : self.robot.n], rows[:, self.robot.n :])
+            model.append(data.rows(model_torque(body, acting, signals, state)))
         changes = (np.stack(model[1:], axis=1) - model[0][:, None]) * np.sqrt(data.periods)
         targets = np.stack([data.target(tau) for tau in data.period_tau_motor], axis=1)
         return targets - data.target(data.tau_motor)[:, None], changes
@@ -124,6 +115,37 @@ class Periods:
                 found.append((State(self.robot, thin, state.channels), rows))
             self._period_bodies[signals] = found
         return self._period_bodies[signals]
+
+
+def torques_of(
+    effects: Sequence[Effect], parameters: Mapping[str, float], robot: Robot
+) -> list[tuple[Effect, FloatArray]]:
+    """Effects with columns, and the values (k,) of these."""
+    values = [np.array([parameters[column.name] for column in effect.columns(robot)]) for effect in effects]
+    return [(effect, each) for effect, each in zip(effects, values, strict=True) if len(each)]
+
+
+def model_torque(
+    begun: Contribution, acting: Sequence[tuple[Effect, FloatArray]], signals: Sequence[Effect], state: State
+) -> Contribution:
+    """Torques (N, n) of a model on one motion.
+
+    Args:
+        begun: torques (N, n) that are known already.
+        acting: effects and the values of their columns.
+        signals: effects in the chain of signals, those that only change the torque too.
+        state: robot and motion.
+    """
+    link, motor = begun.link.copy(), begun.motor.copy()
+    for effect, values in acting:
+        part = effect.evaluate(state)
+        joint = slice(None) if part.joint is None else part.joint
+        link[:, joint] += part.link[:, joint] @ values
+        motor[:, joint] += part.motor[:, joint] @ values
+    total = Contribution(link, motor)
+    for signal in signals:
+        total = signal.shifted(state.robot, state.motion.time, total)
+    return total
 
 
 def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:

@@ -6,9 +6,9 @@ Without OMP_NUM_THREADS and its like in the environment, or both are the same. A
 recorded for twenty periods. Printed: seconds of both, and how many times as long the second takes.
 """
 
-import time
 import warnings
-from collections.abc import Callable
+from functools import partial
+from timeit import repeat
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -19,16 +19,6 @@ from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.simulation import PlantedEffect, simulate
 
 RUNS = 3
-
-
-def seconds(call: Callable[[], object]) -> float:
-    """Shortest of some runs."""
-    found = []
-    for _ in range(RUNS):
-        start = time.perf_counter()
-        call()
-        found.append(time.perf_counter() - start)
-    return min(found)
 
 
 def main() -> None:
@@ -46,7 +36,8 @@ def main() -> None:
         ("diagnose", sea_ident.diagnose, (model, recording)),
     ):
         unlimited = function.__wrapped__  # type: ignore[attr-defined]
-        one, many = seconds(lambda f=function, g=given: f(*g)), seconds(lambda f=unlimited, g=given: f(*g))
+        calls = [partial(call, *given) for call in (function, unlimited)]
+        one, many = (min(repeat(call, number=1, repeat=RUNS)) for call in calls)
         print(f"{name}: {one:.2f} s on one thread, {many:.2f} s on {own}: {many / one:.1f} times")
 
 

@@ -124,3 +124,14 @@ def test_a_joint_that_is_not_measured_is_refused(settled):
     bench, fit, _ = settled
     with pytest.raises(ValueError, match="no equation with the motor of joint 'toe'"):
         breakaway_excess(bench, fit, "toe")
+
+
+def test_a_torque_that_is_late_is_none_that_lets_go_late(laboratory):
+    """In the model the delay is nothing that breaks away; without it the torque of another instant stands there."""
+    delay = make_effect("torque_delay", "knee", delay=0.02)
+    data = laboratory.data(laboratory.record([(delay, [])], periods=10))
+    bench = Bench(data, laboratory.effects)
+    start = settle(bench, (*bench.effects, delay)).fit
+    prompt = replace(start, effects=tuple(e for e in start.effects if e.name != "torque_delay"))
+    assert breakaway_p(bench, start, "knee") == 1.0
+    assert breakaway_p(bench, prompt, "knee") < 1e-3
