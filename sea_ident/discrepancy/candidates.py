@@ -11,10 +11,11 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import nearly
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.effects import Effect, Side, effect_classes
+from sea_ident.effects import Effect, JointEffect, Side, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
@@ -34,6 +35,13 @@ LARGEST_OF_MANY = 0.5
 
 COLUMNS_AT_ONCE = 200
 """Columns of candidates that are compared with the model at a time, or a few more."""
+
+AMOUNT_DIGITS = 2
+"""Digits of errors in the chain of signals that the columns of other candidates are evaluated behind: more make no
+difference to which of them promises most, and every one of them would be evaluated again whenever a fit moves, ..."""
+
+ELSEWHERE_DIGITS = 1
+"""... and those for what depends on where the links are, not on how much a spring gives."""
 
 ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
@@ -218,8 +226,9 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
             spectra = np.stack([torque for torque, _ in shown], axis=-1)[:, :, None, :]
             slopes = np.stack([slope for _, slope in shown], axis=-1)
         else:
-            variants = _coarse(anchored).variants(bench.state(fit.effects))
-            touched, spectra = bench.variant_spectra(variants, fit.effects)
+            around = nearly(fit.effects, AMOUNT_DIGITS if isinstance(anchored, JointEffect) else ELSEWHERE_DIGITS)
+            variants = _coarse(anchored).variants(bench.state(around))
+            touched, spectra = bench.variant_spectra(variants, around)
     except EffectError:
         return None
     harmonics, equations, count, width = spectra.shape

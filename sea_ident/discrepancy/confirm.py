@@ -11,7 +11,7 @@ from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.search import FAMILY_LEVEL, SMALLEST_SHARE, Selection, search, without
+from sea_ident.discrepancy.search import FAMILY_LEVEL, MOST_EFFECTS, SMALLEST_SHARE, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
 FAR = 6
@@ -90,6 +90,25 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     return found.less(without(bench, selection, weak)) if weak else found
 
 
+def _begun(far: Bench, confirmed: Confirmed, before: Settled) -> Selection | None:
+    """What a search with fewer samples begins with: what was found, or was before some of it was taken out again.
+
+    The samples that are compared no longer may be what spoke against it.
+
+    Args:
+        far: the recording with these samples.
+        confirmed: what was found with more of them.
+        before: the model with that, settled there.
+    """
+    if explains_nearly_all(far, confirmed.start.fit, before):
+        return confirmed.selection
+    whole = confirmed.selection.whole
+    if whole is None or not confirmed.selection.added < whole.added < MOST_EFFECTS:
+        return None
+    nearly = explains_nearly_all(far, confirmed.start.fit, settle_again(far, whole.final.fit))
+    return whole if nearly else None
+
+
 def explains_nearly_all(bench: Bench, start: Fit, final: Settled) -> bool:
     """Whether what was found explains so much that another search may begin with it.
 
@@ -124,8 +143,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
     if most < PROMISING * first.excess:
         return None
-    nearly = explains_nearly_all(far, confirmed.start.fit, before)
-    found = search(far, bench.effects, confirmed.selection if nearly else None)
+    found = search(far, bench.effects, _begun(far, confirmed, before))
     fit = found.final.fit
     explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
     if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):

@@ -45,6 +45,21 @@ def _moves(kind: type[Effect]) -> bool:
     return kind.corrected is not Effect.corrected
 
 
+def nearly(effects: Sequence[Effect], digits: int) -> tuple[Effect, ...]:
+    """The same effects, with amounts in the chain of signals rounded: what hardly depends on them is then found again.
+
+    Args:
+        effects: the effects.
+        digits: that are kept of every amount.
+    """
+    return tuple(_rounded(effect, digits) if isinstance(effect, SignalEffect) else effect for effect in effects)
+
+
+def _rounded(effect: SignalEffect, digits: int) -> SignalEffect:
+    amounts = {a.name: float(f"{getattr(effect, a.name):.{digits - 1}e}") for a in effect.amounts}
+    return replace(effect, **amounts)  # type: ignore[arg-type]
+
+
 def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
     """Those effects in the chain of signals that change the columns of an effect: what is of one joint sees its own."""
     if not isinstance(effect, JointEffect):

@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import successive
 from sea_ident.discrepancy.data import PeriodData, spectrum, towards
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import moving, signal_effects
+from sea_ident.discrepancy.free_shapes import moving, nearly, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
 from sea_ident.effects.drift import TrendEffect
@@ -17,6 +17,9 @@ from sea_ident.robot import Robot
 
 PERIOD_SAMPLES = 2
 """Samples of a single period that its model torque is computed at, per harmonic of its motion."""
+
+AMOUNT_DIGITS = 3
+"""Digits of errors in the chain of signals that periods are compared behind: they are the same in all of them."""
 
 
 class Periods:
@@ -97,6 +100,7 @@ class Periods:
 
     def _body_rows(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> list[tuple[State, FloatArray]]:
         """State and rows (N', 2 n, k) of bodies and rotors of the mean, then of every period, at fewer samples."""
+        signals = nearly(signals, AMOUNT_DIGITS)
         if signals not in self._period_bodies:
             if len(self._period_bodies) > 3:
                 self._period_bodies.clear()

@@ -114,6 +114,7 @@ class Selection:
         p_values: of each added effect, corrected for all that was tried.
         candidates: scan around the final model.
         tests: number of shapes of all candidates.
+        whole: the same before what was no longer needed was taken out.
     """
 
     start: "Settled"
@@ -122,6 +123,7 @@ class Selection:
     p_values: tuple[float, ...]
     candidates: tuple[Candidate, ...] = ()
     tests: int = 1
+    whole: "Selection | None" = None
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -153,7 +155,7 @@ def search(
     start = settle(bench, effects) if start is None else start
     now, added = start, list[float]()
     largest = np.zeros(len(bench.data.equations))
-    tried: Tried = {}
+    tried = Tried()
     if begun is not None and begun.added:
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
@@ -178,8 +180,9 @@ def search(
             added.pop()
             now = last
             break
+    whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
     now, added = _eliminate(bench, now, added, tests)
-    return Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
+    return replace(whole, final=now, added=len(added), p_values=tuple(added), whole=whole)
 
 
 def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key]) -> Settled:
@@ -273,7 +276,8 @@ def next_effect(
     own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
     if tried is not None:
         for candidate, gain in refits:
-            tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
+            promised, explained = candidate.gain / whole_gain, gain / whole_gain
+            tried.outdone[own, candidate.key] = Outdone(promised, explained, whole_gain - gain, best.statistic)
     return best, best_p
 
 
