@@ -91,22 +91,23 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
 
 
 def _begun(far: Bench, confirmed: Confirmed, before: Settled) -> Selection | None:
-    """What a search with fewer samples begins with: what was found, or was before some of it was taken out again.
+    """What a search with fewer samples begins with: nothing, or what was found if it explains nearly all there.
 
-    The samples that are compared no longer may be what spoke against it.
+    With what was taken out of it again, where that explains nearly all of what is left: the samples that spoke against
+    it may be those that are compared no longer.
 
     Args:
         far: the recording with these samples.
         confirmed: what was found with more of them.
         before: the model with that, settled there.
     """
-    if explains_nearly_all(far, confirmed.start.fit, before):
-        return confirmed.selection
-    whole = confirmed.selection.whole
-    if whole is None or not confirmed.selection.added < whole.added < MOST_EFFECTS:
-        return None
-    nearly = explains_nearly_all(far, confirmed.start.fit, settle_again(far, whole.final.fit))
-    return whole if nearly else None
+    nothing = far.fit(far.effects, before.noise, start=confirmed.start.fit.parameters)
+    found, left, whole = confirmed.selection, before.fit.excess, confirmed.selection.whole
+    if whole is not None and found.added < whole.added < MOST_EFFECTS:
+        more = settle_again(far, whole.final.fit)
+        if more.fit.excess < (1.0 - NEARLY_ALL) * left:
+            found, left = whole, more.fit.excess
+    return found if left < (1.0 - NEARLY_ALL) * nothing.excess else None
 
 
 def explains_nearly_all(bench: Bench, start: Fit, final: Settled) -> bool:

@@ -21,6 +21,12 @@ def test_the_gap_of_a_slide_is_a_force():
     assert "to 0.1 N m at turn" in _gap_sentence(turned, units)
 
 
+def test_forces_and_torques_are_compared_beside_their_noise():
+    gap = Gap({"lift": 2.0, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, {"lift": 0.3, "turn": 0.02})
+    assert "at turn, where it was largest beside its noise." in _gap_sentence(gap, {"lift": "N", "turn": "N m"})
+    assert "at lift, where it was largest." in _gap_sentence(gap, {"lift": "N m", "turn": "N m"})
+
+
 def facts(verdict, periods=12, remainder=0.0, p_value=0.0, sound=True, trends=()):
     gap = Gap({"hip": 0.5}, {"hip": 0.0}, {"hip": 0.1})
     missing = (MissingEffect("torque_offset", "hip", (), 0.05, 1e-9, ()),)
