@@ -6,7 +6,7 @@ friction that only starts to slide exceeds there what it is when it slides.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -16,6 +16,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
+from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.periods import model_torque, torques_of
 from sea_ident.discrepancy.standing import known_speed
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
@@ -38,6 +39,44 @@ FEWEST_PASSES = 4
 
 LEVEL = 1e-5
 """Probability that a breakaway torque must not exceed to show stiction."""
+
+
+@dataclass(frozen=True)
+class Breakaway:
+    """How much later than it slides friction lets a motor go.
+
+    Attributes:
+        joint: of the motor.
+        excess: torque beyond the sliding friction, the mean over passes [N m] or [N].
+        std: standard deviation of it, by the scatter of the passes.
+        passes: in which the motor is let go.
+    """
+
+    joint: str
+    excess: float
+    std: float
+    passes: int
+
+
+def stiction(bench: Bench, fit: Fit, position: int, noise: NoiseFloor) -> Breakaway | None:
+    """By how much an effect of a model lets its motor go late, None where that is nothing that the passes show.
+
+    Args:
+        bench: the recording.
+        fit: the model with the effect.
+        position: of the effect in it.
+        noise: noise floor.
+    """
+    effect = fit.effects[position]
+    others = [e for k, e in enumerate(fit.effects) if k != position]
+    if not isinstance(effect, StribeckFriction):
+        return None
+    rest = bench.fit(others, noise, start=fit.parameters, tangents=False)
+    if not lets_go_late(bench, rest, effect):
+        return None
+    excess = breakaway_excess(bench, rest, effect.required_joint)
+    std = float(np.std(excess, ddof=1)) / np.sqrt(len(excess))
+    return Breakaway(effect.required_joint, float(np.mean(excess)), std, len(excess))
 
 
 def lets_go_late(bench: Bench, fit: Fit, effect: Effect) -> bool:

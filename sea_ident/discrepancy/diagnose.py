@@ -10,6 +10,7 @@ from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
+from sea_ident.discrepancy.breakaway import stiction
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
@@ -132,8 +133,11 @@ def diagnose(
     tell("simulating", 0.85)
     repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
+    sticking = _sticking(bench, selection)
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    notes = replace(notes, warnings=(*notes.warnings, *found.notes, *basic_notes, *held_notes, *forward.notes))
+    notes = replace(
+        notes, warnings=(*notes.warnings, *found.notes, *basic_notes, *sticking, *held_notes, *forward.notes)
+    )
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
@@ -262,6 +266,14 @@ def _out(held: HeldOut, drifting: int) -> list[int]:
 def _with_alternatives(bench: Bench, selection: Selection) -> tuple[Selection, Alternatives]:
     """What was found, the simplest of what this motion does not tell apart, and what else it could be."""
     return simplest_first(bench, selection, assess.rivals(bench, selection))
+
+
+def _sticking(bench: Bench, selection: Selection) -> tuple[str, ...]:
+    """What the passes say of the stiction that was found, in words."""
+    final, units = selection.final, check.torque_units(bench.robot)
+    count = len(final.fit.effects)
+    shown = [stiction(bench, final.fit, k, final.noise) for k in range(count - selection.added, count)]
+    return tuple(words.stiction(each, units[each.joint]) for each in shown if each is not None)
 
 
 def _unsearched(bench: Bench) -> Selection:

@@ -276,8 +276,8 @@ def next_effect(
     own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
     if tried is not None:
         for candidate, gain in refits:
-            promised, explained = candidate.gain / whole_gain, gain / whole_gain
-            tried.outdone[own, candidate.key] = Outdone(promised, explained, whole_gain - gain, best.statistic)
+            shares = candidate.gain / whole_gain, gain / whole_gain
+            tried.outdone[own, candidate.key] = Outdone(*shares, whole_gain - gain, best.statistic)
     return best, best_p
 
 

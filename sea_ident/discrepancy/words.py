@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from sea_ident.discrepancy.breakaway import Breakaway
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
@@ -87,6 +88,14 @@ def slow_samples(data: PeriodData) -> str:
         f"samples in which a joint hardly moves were left out, up to {shares[worst]:.0%} ({equation.kind} of "
         f"{equation.joint}): there friction follows from a velocity that is hardly more than its noise, and what is "
         "named does not explain them. Let the joints pass zero velocity faster"
+    )
+
+
+def stiction(found: Breakaway, unit: str) -> str:
+    """That the passes show a motor to be let go later than it slides, and by how much."""
+    return (
+        f"stiction at {found.joint}: in {found.passes} passes friction lets the motor go only at "
+        f"{found.excess:.3g} +- {found.std:.2g} {unit} above what it slides in"
     )
 
 

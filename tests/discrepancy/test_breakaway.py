@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.breakaway import LEVEL, breakaway_excess, breakaway_p, let_go, lets_go_late
+from sea_ident.discrepancy.breakaway import (
+    LEVEL,
+    Breakaway,
+    breakaway_excess,
+    breakaway_p,
+    let_go,
+    lets_go_late,
+    stiction,
+)
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import known_speed
+from sea_ident.discrepancy.words import stiction as words_of_stiction
 from sea_ident.effects import make_effect
 
 KNEE = 1
@@ -93,6 +102,31 @@ def test_only_stiction_lets_go_late(settled, laboratory):
     assert lets_go_late(held, fit, make_effect("stribeck_friction", "knee"))
     assert not lets_go_late(held, fit, make_effect("stribeck_friction", "hip"))
     assert not lets_go_late(held, fit, make_effect("nonlinear_viscous_friction", "knee"))
+
+
+def test_how_late_a_model_with_stiction_lets_go_is_told(settled, laboratory):
+    bench, fit, before = settled
+    sizes = 1.0 + 0.2 * np.resize([-1.0, 1.0], bench.data.periods)
+    held = Bench(with_stiction(bench.data, sizes - before), laboratory.effects)
+    model = (*fit.effects, make_effect("stribeck_friction", "knee"), make_effect("stribeck_friction", "hip"))
+    now = settle(held, model)
+    rest = held.fit(now.fit.effects[:-2] + now.fit.effects[-1:], now.noise, start=now.fit.parameters, tangents=False)
+    expected = breakaway_excess(held, rest, "knee")
+    found = stiction(held, now.fit, len(model) - 2, now.noise)
+    assert found.passes == bench.data.periods
+    assert found.excess == pytest.approx(np.mean(expected))
+    assert found.std == pytest.approx(np.std(expected, ddof=1) / np.sqrt(found.passes))
+    # about the torque that was put there, for sliding friction is fitted beside it
+    assert found.excess == pytest.approx(1.0, abs=0.3)
+    assert stiction(held, now.fit, len(model) - 1, now.noise) is None
+    assert stiction(held, now.fit, 0, now.noise) is None
+
+
+def test_stiction_is_told_with_its_spread():
+    words = words_of_stiction(Breakaway("lift", 12.345, 0.321, 20), "N")
+    assert words == (
+        "stiction at lift: in 20 passes friction lets the motor go only at 12.3 +- 0.32 N above what it slides in"
+    )
 
 
 def test_a_small_excess_is_none(settled, laboratory):

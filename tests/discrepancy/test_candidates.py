@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from sea_ident.discrepancy import candidates
+from sea_ident.discrepancy import candidates, periods
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.effects import make_effect
+
+OFFSETS = (0.0123, 0.012341)
 
 
 def test_of_candidates_that_do_the_same_the_simplest_comes_first(nothing_missing, monkeypatch):
@@ -33,3 +36,40 @@ def test_of_candidates_that_do_the_same_the_simplest_comes_first(nothing_missing
             orders.append([c.effect.name for c in three])
     assert orders[0] == orders[1]
     assert all(order[0] == "torque_offset" for order in orders)
+
+
+def behind_an_offset(laboratory, offset):
+    """Bench and model of a leg with an error of the encoder of its knee."""
+    bench = laboratory.bench(laboratory.record([("encoder_offset", "knee", [], {"offset": 0.0123})]))
+    model = (*bench.effects, make_effect("encoder_offset", "knee", offset=offset))
+    start = bench.fit(model, None, tangents=False)
+    noise = bench.noise(start)
+    return bench, bench.fit(model, noise, start=start.parameters), noise
+
+
+def test_candidates_behind_nearly_the_same_error_of_an_encoder_are_evaluated_once(laboratory, monkeypatch):
+    bench, fit, noise = behind_an_offset(laboratory, OFFSETS[0])
+    effects = [make_effect("torque_ripple", "knee"), make_effect("parallel_spring", "knee")]
+    effects += [make_effect("external_force", "ankle")]
+    rounded = scan(bench, fit, noise, effects)
+    evaluated = []
+    monkeypatch.setattr(bench, "spectra_of_variants", lambda variants, signals: evaluated.append(variants))
+    model = (*bench.effects, make_effect("encoder_offset", "knee", offset=OFFSETS[1]))
+    scan(bench, bench.fit(model, noise, start=fit.parameters), noise, effects)
+    assert evaluated == []
+    # and what they promise is what it is behind all digits of it
+    monkeypatch.undo()
+    monkeypatch.setattr(candidates, "AMOUNT_DIGITS", 16)
+    monkeypatch.setattr(candidates, "ELSEWHERE_DIGITS", 16)
+    exact = {c.key: c for c in scan(bench, fit, noise, effects)}
+    for candidate in rounded:
+        assert np.sum(candidate.raw_power) == pytest.approx(np.sum(exact[candidate.key].raw_power), rel=0.02)
+
+
+def test_the_noise_is_the_same_behind_a_rounded_error_of_an_encoder(laboratory, monkeypatch):
+    floors = []
+    for digits in (periods.AMOUNT_DIGITS, 16):
+        monkeypatch.setattr(periods, "AMOUNT_DIGITS", digits)
+        floors.append(behind_an_offset(laboratory, OFFSETS[1])[2].std)
+    np.testing.assert_allclose(floors[0], floors[1], rtol=1e-4)
+    assert np.any(floors[0] != floors[1])

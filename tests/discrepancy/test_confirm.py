@@ -1,13 +1,15 @@
 """What only the samples near reversals speak for is dropped, what holds elsewhere stays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.columns import effect_key
-from sea_ident.discrepancy.confirm import confirm
+from sea_ident.discrepancy.confirm import Confirmed, _begun, confirm
 from sea_ident.discrepancy.data import BARELY_SEEN, around_reversals, away_from_reversals
-from sea_ident.discrepancy.search import Selection, without
+from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
 
@@ -109,3 +111,48 @@ def test_without_everything_is_the_start(both):
     assert left.final.fit.statistic / left.final.fit.dof == pytest.approx(
         selection.start.fit.statistic / selection.start.fit.dof, rel=0.05
     )
+
+
+def test_a_search_with_fewer_samples_begins_with_what_was_taken_out_where_that_explains_it(rippled):
+    bench, start, right = rippled
+    found = Selection(start, start, 0, ())
+    whole = Selection(start, right, 1, (1e-9,))
+    taken_out = Confirmed(replace(found, whole=whole), bench, start, start)
+    assert _begun(bench, taken_out, start) is whole
+    # nothing was found, and nothing taken out
+    assert _begun(bench, Confirmed(found, bench, start, start), start) is None
+    assert _begun(bench, Confirmed(replace(found, whole=found), bench, start, start), start) is None
+    # nothing more could be found beside that many
+    full = replace(found, whole=replace(whole, added=MOST_EFFECTS))
+    assert _begun(bench, Confirmed(full, bench, start, start), start) is None
+
+
+def test_what_explains_little_of_the_rest_is_not_begun_with(rippled):
+    bench, start, right = rippled
+    useless = make_effect("torque_offset", "knee")
+    other = Settled(bench.fit((*start.fit.effects, useless), start.noise, start=start.fit.parameters), start.noise)
+    selection = Selection(start, start, 0, (), whole=Selection(start, other, 1, (1e-9,)))
+    assert _begun(bench, Confirmed(selection, bench, start, start), start) is None
+    # beside what explains nearly all it is left out again
+    found = Selection(start, right, 1, (1e-9,))
+    more = bench.fit((*right.fit.effects, useless), right.noise, start=right.fit.parameters)
+    kept = replace(found, whole=Selection(start, Settled(more, right.noise), 2, (1e-9, 1e-9)))
+    assert _begun(bench, Confirmed(kept, bench, start, right), right) is kept
+
+
+def test_a_search_tells_what_it_had_before_it_took_anything_out(rippled, monkeypatch):
+    bench, start, right = rippled
+    begun = Selection(start, right, 1, (1e-9,))
+    taken = []
+
+    def none_left(bench, now, added, tests, fewest=1):
+        taken.append(now)
+        return start, []
+
+    monkeypatch.setattr("sea_ident.discrepancy.search._eliminate", none_left)
+    found = search(bench, bench.effects, begun, start=start)
+    assert found.added == 0
+    assert found.final is start
+    assert found.whole.added >= 1
+    assert found.whole.final is taken[0]
+    assert found.whole.effects[0].name == "torque_ripple"
