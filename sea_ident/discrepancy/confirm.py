@@ -101,13 +101,12 @@ def _begun(far: Bench, confirmed: Confirmed, before: Settled) -> Selection | Non
         confirmed: what was found with more of them.
         before: the model with that, settled there.
     """
-    nothing = far.fit(far.effects, before.noise, start=confirmed.start.fit.parameters)
-    found, left, whole = confirmed.selection, before.fit.excess, confirmed.selection.whole
+    found, there, whole = confirmed.selection, before, confirmed.selection.whole
     if whole is not None and found.added < whole.added < MOST_EFFECTS:
         more = settle_again(far, whole.final.fit)
-        if more.fit.excess < (1.0 - NEARLY_ALL) * left:
-            found, left = whole, more.fit.excess
-    return found if left < (1.0 - NEARLY_ALL) * nothing.excess else None
+        if more.fit.excess < (1.0 - NEARLY_ALL) * there.fit.excess:
+            found, there = whole, more
+    return found if explains_nearly_all(far, confirmed.start.fit, there) else None
 
 
 def explains_nearly_all(bench: Bench, start: Fit, final: Settled) -> bool:

@@ -225,7 +225,8 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
     lack, gap = record["lack_of_fit"], record["gap"]
     after = record.get("next_experiment")
     waves = record.get("waveforms")
-    training = _gap_from_dict(gap["training"])
+    units = {str(joint): str(unit) for joint, unit in record.get("units", {}).items()}
+    training = _gap_from_dict(gap["training"], units)
     return Diagnosis(
         verdict=Verdict(record["verdict"]),
         text=record["summary"],
@@ -241,8 +242,8 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
         ),
         missing=tuple(_missing_from_dict(m) for m in record["missing"]),
         training=training if training is not None and training.before else None,
-        holdout=_gap_from_dict(gap["holdout"]),
-        simulation_gap={k: _gap(g) for k, g in record["simulation_gap"].items()},
+        holdout=_gap_from_dict(gap["holdout"], units),
+        simulation_gap={k: _gap(g, units) for k, g in record["simulation_gap"].items()},
         detectability=tuple(
             Detectability(
                 d["effect"], d["joint"], float("inf") if d["smallest"] is None else _finite(d["smallest"]), d["unit"],
@@ -260,7 +261,7 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
         waveforms=None if waves is None else _waveforms_from_dict(waves),
         recording=record.get("recording", ""),
         holdout_source=record.get("holdout"),
-        units={str(joint): str(unit) for joint, unit in record.get("units", {}).items()},
+        units=units,
     )  # fmt: skip
 
 
@@ -293,15 +294,15 @@ def _numbers(record: Mapping[str, Any]) -> dict[str, float]:
     return {str(key): _finite(value) for key, value in record.items()}
 
 
-def _gap_from_dict(record: Mapping[str, Any] | None) -> Gap | None:
-    return None if record is None else _gap(record)
+def _gap_from_dict(record: Mapping[str, Any] | None, units: Mapping[str, str]) -> Gap | None:
+    return None if record is None else _gap(record, units)
 
 
-def _gap(record: Mapping[str, Any]) -> Gap:
+def _gap(record: Mapping[str, Any], units: Mapping[str, str]) -> Gap:
     before, after, noise = (_numbers(record[key]) for key in ("before", "after", "noise"))
     if not before.keys() == after.keys() == noise.keys():
         raise ValueError("a gap names different joints before and after")
-    return Gap(before, after, noise)
+    return Gap(before, after, noise, units)
 
 
 def _waveforms_from_dict(w: Mapping[str, Any]) -> Waveforms:

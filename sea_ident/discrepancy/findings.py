@@ -152,23 +152,40 @@ class MissingEffect:
 
 @dataclass(frozen=True)
 class Gap:
-    """Rms beyond the noise per joint [N m].
+    """Rms beyond the noise per joint [N m], [N] for a slide; of positions [rad] or [m].
 
     Attributes:
         before: of the model as it was, refitted.
         after: of the model with the effects.
         noise: rms of the noise of the mean.
+        units: unit of the torque of each joint; none where all are alike.
     """
 
     before: Mapping[str, float]
     after: Mapping[str, float]
     noise: Mapping[str, float]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def shrink(self) -> float:
-        """1 - after / before over all joints; 0 where there was none."""
-        before, after = (float(np.linalg.norm(list(part.values()))) for part in (self.before, self.after))
+        """1 - after / before over all joints, each in units of its noise where they differ; 0 where there was none."""
+        before, after = (float(np.linalg.norm(self._comparable(part))) for part in (self.before, self.after))
         return 1.0 - after / before if before > 0.0 else 0.0
+
+    @property
+    def largest(self) -> str:
+        """The joint where the gap was largest, beside its noise where units differ."""
+        return list(self.before)[int(np.argmax(self._comparable(self.before)))]
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the units of joints differ."""
+        return len({self.units.get(joint) for joint in self.before}) > 1
+
+    def _comparable(self, sizes: Mapping[str, float]) -> FloatArray:
+        """(n,) sizes of one unit."""
+        mixed = self.mixed
+        return np.array([size / max(self.noise[joint], 1e-300) if mixed else size for joint, size in sizes.items()])
 
     def summary(self) -> str:
         """Before, after and noise per joint."""

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import corrected_motion
 from sea_ident.effects.signal import SignalEffect
@@ -233,7 +234,8 @@ def simulation_gap(
         seen = np.any([power > floor for power in powers], axis=0)
         rms = [np.sqrt(np.where(seen, np.maximum(power, 0.0), 0.0)) for power in powers]
         noise = np.sqrt(noise_power(both[1]))
-        gaps[kind] = Gap(*(dict(zip(names, map(float, values), strict=True)) for values in (*rms, noise)))
+        had, left, unsure = (dict(zip(names, map(float, values), strict=True)) for values in (*rms, noise))
+        gaps[kind] = Gap(had, left, unsure, torque_units(before.robot))
         unseen[kind] = [name for name, there in zip(names, seen, strict=True) if not there]
     if unseen["q"]:
         notes.append(

@@ -4,6 +4,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.noise import NoiseFloor
@@ -31,6 +32,7 @@ def gap_of(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor) -> Gap:
         per_joint(bench, excess_power(bench, before, noise)),
         per_joint(bench, excess_power(bench, after, noise)),
         per_joint(bench, noise.std**2),
+        torque_units(bench.robot),
     )
 
 

@@ -323,7 +323,8 @@ def _gap(bench: StretchBench, before: Fit, after: Fit, pushes: tuple[Push, ...])
         rms: FloatArray = np.sqrt(np.maximum(power - noise**2, 0.0))
         return {name: float(value) for name, value in zip(names, rms, strict=True)}
 
-    return Gap(beyond(before), beyond(after), {name: float(v) for name, v in zip(names, noise, strict=True)})
+    of_noise = {name: float(v) for name, v in zip(names, noise, strict=True)}
+    return Gap(beyond(before), beyond(after), of_noise, torque_units(bench.robot))
 
 
 def _text(

@@ -101,9 +101,7 @@ def stiction(found: Breakaway, unit: str) -> str:
 
 def _gap_sentence(gap: Gap, units: Mapping[str, str]) -> str:
     """The gap on the recording, where it was largest; where it is below the noise, what that means."""
-    # forces and torques do not compare, but each does with its noise
-    mixed = len({units[joint] for joint in gap.before}) > 1
-    worst = max(gap.before, key=lambda j: gap.before[j] / max(gap.noise[j], 1e-300) if mixed else gap.before[j])
+    worst = gap.largest
     if gap.before[worst] <= 0.0:
         return (
             "It is smaller than the noise of the mean torque in every joint: the pattern over the period shows it, the "
@@ -111,7 +109,7 @@ def _gap_sentence(gap: Gap, units: Mapping[str, str]) -> str:
         )
     after, unit = gap.after[worst], units[worst]
     to = f"to {after:.3g} {unit}" if after > 0.0 else f"to nothing beyond the noise ({gap.noise[worst]:.2g} {unit})"
-    where = "where it was largest" + (" beside its noise" if mixed else "")
+    where = "where it was largest" + (" beside its noise" if gap.mixed else "")
     return f"With it the gap on this recording goes from {gap.before[worst]:.3g} {to} at {worst}, {where}."
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, Verdict, chance
@@ -14,17 +15,22 @@ from sea_ident.effects import make_effect
 
 
 def test_the_gap_of_a_slide_is_a_force():
-    gap = Gap({"lift": 2.0, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, {"lift": 0.3, "turn": 0.2})
     units = {"lift": "N", "turn": "N m"}
+    gap = Gap({"lift": 2.0, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, {"lift": 0.3, "turn": 0.2}, units)
     assert "(0.3 N) at lift" in _gap_sentence(gap, units)
-    turned = Gap({"lift": 0.1, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, gap.noise)
+    turned = Gap({"lift": 0.1, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, gap.noise, units)
     assert "to 0.1 N m at turn" in _gap_sentence(turned, units)
 
 
 def test_forces_and_torques_are_compared_beside_their_noise():
-    gap = Gap({"lift": 2.0, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, {"lift": 0.3, "turn": 0.02})
-    assert "at turn, where it was largest beside its noise." in _gap_sentence(gap, {"lift": "N", "turn": "N m"})
-    assert "at lift, where it was largest." in _gap_sentence(gap, {"lift": "N m", "turn": "N m"})
+    sizes = {"lift": 2.0, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, {"lift": 0.4, "turn": 0.02}
+    mixed, alike = {"lift": "N", "turn": "N m"}, {"lift": "N m", "turn": "N m"}
+    gap = Gap(*sizes, mixed)
+    assert "at turn, where it was largest beside its noise." in _gap_sentence(gap, mixed)
+    assert gap.shrink == pytest.approx(1.0 - 5.0 / np.hypot(5.0, 25.0))
+    gap = Gap(*sizes, alike)
+    assert "at lift, where it was largest." in _gap_sentence(gap, alike)
+    assert gap.shrink == pytest.approx(1.0 - 0.1 / np.hypot(2.0, 0.5)) == Gap(*sizes).shrink
 
 
 def facts(verdict, periods=12, remainder=0.0, p_value=0.0, sound=True, trends=()):
