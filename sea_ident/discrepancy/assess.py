@@ -34,6 +34,7 @@ from sea_ident.effects import Effect, Side
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
+from sea_ident.singular_values import svd
 
 THE_SAME = 0.05
 """Two effects between whose statistics there is less than this are one and the same on this motion."""
@@ -336,7 +337,7 @@ def _shapes(bench: Bench, effect: Effect) -> tuple[tuple[str, float, str], ...]:
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:
-    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    left, strength, _ = svd(columns)
     kept: FloatArray = left[:, strength > 1e-6 * max(float(strength.max(initial=0.0)), 1e-300)]
     return kept if np.any(strength > 0.0) else kept[:, :0]
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.data import ALIKE
 from sea_ident.discrepancy.linear import span
+from sea_ident.singular_values import svd
 
 
 def free_samples(left_out: NDArray[np.bool_], harmonics: int, alike: float = ALIKE) -> NDArray[np.complex128]:
@@ -40,7 +41,7 @@ def _alike_once(group: IntArray, samples: int, harmonics: int, alike: float) -> 
     """(2 H + 2, m) real and imaginary parts of what is within the band of a run of samples, alike ones once."""
     phase = np.exp(-2j * np.pi * np.outer(np.arange(harmonics + 1), group) / samples) / samples
     phase[1:] *= np.sqrt(2.0)
-    left, strength, _ = np.linalg.svd(np.concatenate([phase.real, phase.imag]), full_matrices=False)
+    left, strength, _ = svd(np.concatenate([phase.real, phase.imag]))
     return np.asarray(left[:, strength > alike * strength[0]], dtype=np.float64)
 
 

@@ -5,6 +5,7 @@ import scipy.linalg
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.noise import ComplexArray, stacked
+from sea_ident.singular_values import svd
 
 RANK_TOLERANCE = 1e-9
 """Singular directions of the normalised columns below this share of the largest are left out."""
@@ -36,10 +37,10 @@ def solve(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArr
     scale = _norms(columns)
     # QR first: the singular values of a small triangle cost next to nothing
     q, r = scipy.linalg.qr(columns / scale, mode="economic", overwrite_a=True, check_finite=False)
-    left, strength, right = np.linalg.svd(r)
+    left, strength, right = svd(r)
     keep = strength > RANK_TOLERANCE * max(float(strength[0]), 1e-300)
-    basis = q @ left[:, : len(strength)][:, keep]
-    factor = (right[: len(strength)][keep].T / strength[keep]) / scale[:, None]
+    basis = q @ left[:, keep]
+    factor = (right[keep].T / strength[keep]) / scale[:, None]
     return factor @ (basis.T @ target), basis, factor
 
 
@@ -58,10 +59,10 @@ def least_squares(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, 
     both[:, width] = target
     # with the target as one more column, what the basis would be needed for is in the triangle
     r = scipy.linalg.qr(both, mode="raw", overwrite_a=True, check_finite=False)[1]
-    left, strength, right = np.linalg.svd(r[:width, :width])
+    left, strength, right = svd(r[:width, :width])
     keep = strength > RANK_TOLERANCE * max(float(strength[0]), 1e-300)
-    frame = right[: len(strength)][keep].T / strength[keep] / scale[:, None]
-    return frame @ (left[:, : len(strength)][:, keep].T @ r[:width, width]), frame
+    frame = right[keep].T / strength[keep] / scale[:, None]
+    return frame @ (left[:, keep].T @ r[:width, width]), frame
 
 
 def least_squares_near(frame: FloatArray, columns: FloatArray, target: FloatArray) -> FloatArray:

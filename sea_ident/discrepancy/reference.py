@@ -13,6 +13,7 @@ from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import make_effect
 from sea_ident.estimation import Model
 from sea_ident.regressor import prior_parameters
+from sea_ident.singular_values import svd
 
 LEVEL = 1e-3
 """Probability of a change where there is none."""
@@ -214,7 +215,7 @@ def _span(columns: FloatArray) -> FloatArray:
     columns = columns[:, norms > 1e-9 * max(float(norms.max(initial=0.0)), 1e-300)]
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
-    left, strength, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    left, strength, _ = svd(columns / np.linalg.norm(columns, axis=0))
     kept: FloatArray = left[:, strength > 1e-6 * strength[0]]
     return kept
 

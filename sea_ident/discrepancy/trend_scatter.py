@@ -13,6 +13,7 @@ from scipy import stats
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.trend_directions import Cause, Direction
 from sea_ident.discrepancy.trend_values import times_course
+from sea_ident.singular_values import svd
 
 SAME = 1e-6
 """Combinations of columns weaker than this share of the strongest are the same column twice."""
@@ -28,7 +29,7 @@ def column_space(causes: Sequence[Cause]) -> FloatArray:
     """(M, K) orthonormal basis of the columns of all trends."""
     columns = np.concatenate([cause.columns for cause in causes], axis=1)
     columns = columns / np.linalg.norm(columns, axis=0)
-    basis, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    basis, strength, _ = svd(columns)
     return np.asarray(basis[:, strength > SAME * strength[0]], dtype=np.float64)
 
 
@@ -51,7 +52,7 @@ def scatter_whitener(periods: FloatArray, middle: FloatArray) -> FloatArray:
     smooth = np.linalg.qr(np.vander((middle - middle.mean()) / np.ptp(middle), degree + 1))[0]
     rest = periods - smooth @ (smooth.T @ periods)
     freedom = count - degree - 1
-    axes, size = np.linalg.svd(rest.T / np.sqrt(freedom), full_matrices=False)[:2]
+    axes, size = svd(rest.T / np.sqrt(freedom))[:2]
     ratio, found = width / freedom, size**2
     true = np.ones_like(found)
     beyond = found > (1.0 + np.sqrt(ratio)) ** 2
@@ -73,9 +74,7 @@ def held_basis(held: Sequence[Direction]) -> FloatArray | None:
     """(P M, r) orthonormal basis of trends whose size and course are free, None without any."""
     if not held:
         return None
-    basis, strength, _ = np.linalg.svd(
-        np.concatenate([blocks(d, bends=True) for d in held], axis=1), full_matrices=False
-    )
+    basis, strength, _ = svd(np.concatenate([blocks(d, bends=True) for d in held], axis=1))
     return np.asarray(basis[:, strength > SAME * strength[0]], dtype=np.float64)
 
 
