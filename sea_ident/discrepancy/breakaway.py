@@ -68,9 +68,9 @@ def stiction(bench: Bench, fit: Fit, position: int, noise: NoiseFloor) -> Breaka
         noise: noise floor.
     """
     effect = fit.effects[position]
-    others = [e for k, e in enumerate(fit.effects) if k != position]
     if not isinstance(effect, StribeckFriction):
         return None
+    others = [e for k, e in enumerate(fit.effects) if k != position]
     rest = bench.fit(others, noise, start=fit.parameters, tangents=False)
     if not lets_go_late(bench, rest, effect):
         return None

@@ -28,7 +28,7 @@ PROMISES_MORE = 0.1
 """... unless it promises more of that than it did, by this share of it [-], ..."""
 
 MAKES_UP = 3.0
-"""... nor one that fell short by more than so many times what was explained since: others than it were not missing."""
+"""... nor one that fell short by more than this many times what was explained since [-]."""
 
 
 @dataclass(frozen=True)

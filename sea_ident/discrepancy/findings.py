@@ -150,6 +150,10 @@ class MissingEffect:
         return f"{100 * self.torque_share:.2g} % of torque"
 
 
+NOISE_FREE = 1e-6
+"""Share of a gap below which noise is none that a gap could be measured in [-]."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """Rms beyond the noise per joint [N m], [N] for a slide; of positions [rad] or [m].
@@ -184,8 +188,11 @@ class Gap:
 
     def _comparable(self, sizes: Mapping[str, float]) -> FloatArray:
         """(n,) sizes of one unit."""
-        mixed = self.mixed
-        return np.array([size / max(self.noise[joint], 1e-300) if mixed else size for joint, size in sizes.items()])
+        if not self.mixed:
+            return np.array(list(sizes.values()))
+        # a recording without noise has gaps all the same
+        units = {j: max(self.noise[j], NOISE_FREE * max(self.before[j], self.after[j]), 1e-300) for j in sizes}
+        return np.array([size / units[joint] for joint, size in sizes.items()])
 
     def summary(self) -> str:
         """Before, after and noise per joint."""

@@ -28,6 +28,10 @@ def test_forces_and_torques_are_compared_beside_their_noise():
     gap = Gap(*sizes, mixed)
     assert "at turn, where it was largest beside its noise." in _gap_sentence(gap, mixed)
     assert gap.shrink == pytest.approx(1.0 - 5.0 / np.hypot(5.0, 25.0))
+    # without noise each counts by the share that is left of it
+    assert Gap(*sizes[:2], {"lift": 0.0, "turn": 0.0}, mixed).shrink == pytest.approx(1.0 - 0.2 / np.sqrt(2.0))
+    nothing = {"lift": 0.0, "turn": 0.0}
+    assert Gap(nothing, nothing, nothing, mixed).shrink == 0.0
     gap = Gap(*sizes, alike)
     assert "at lift, where it was largest." in _gap_sentence(gap, alike)
     assert gap.shrink == pytest.approx(1.0 - 0.1 / np.hypot(2.0, 0.5)) == Gap(*sizes).shrink
