@@ -1,5 +1,7 @@
 """Stiction that lets go at another instant in every pass: it is gone from their mean, and every pass shows it."""
 
+import sys
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +17,13 @@ from sea_ident.discrepancy.breakaway import (
     lets_go_late,
     stiction,
 )
+from sea_ident.discrepancy.diagnose import diagnose
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import known_speed
 from sea_ident.discrepancy.words import stiction as words_of_stiction
 from sea_ident.effects import make_effect
+from sea_ident.estimation import identify
+from sea_ident.exceptions import SeaIdentWarning
 
 KNEE = 1
 """Index of the knee of the leg."""
@@ -169,3 +174,14 @@ def test_a_torque_that_is_late_is_none_that_lets_go_late(laboratory):
     prompt = replace(start, effects=tuple(e for e in start.effects if e.name != "torque_delay"))
     assert breakaway_p(bench, start, "knee") == 1.0
     assert breakaway_p(bench, prompt, "knee") < 1e-3
+
+
+def test_a_diagnosis_warns_of_the_stiction_it_found(laboratory, monkeypatch):
+    """Whatever was found is taken for stiction here: what the passes say of it reaches the user."""
+    recording = laboratory.record([("torque_offset", "knee", [2.0], {})])
+    module = sys.modules["sea_ident.discrepancy.diagnose"]  # the package has the function by that name
+    monkeypatch.setattr(module, "stiction", lambda *_: Breakaway("knee", 0.5, 0.1, 8))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = diagnose(identify(laboratory.leg, recording, period=5.0), recording)
+    assert any(text.startswith("stiction at knee") for text in found.warnings)

@@ -1,5 +1,6 @@
 """An effect that was added is replaced by a better one, and what was outdone is not tried again."""
 
+import numpy as np
 import pytest
 
 import sea_ident.discrepancy.exchange as module
@@ -7,6 +8,7 @@ from sea_ident.discrepancy.candidates import scan, sought
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.exchange import Outdone, Tried, exchange
 from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import next_effect
 from sea_ident.discrepancy.settle import settle_again
 
 
@@ -44,7 +46,10 @@ def test_the_right_one_takes_the_place_of_the_wrong_one(wrong, tries):
     assert effect_key(after.fit.effects[-1]) == key("torque_ripple")
     assert after.fit.statistic < 1.2 * after.fit.dof
     own = effect_key(now.fit.effects[-1])
-    assert tried.outdone[own, key("torque_ripple")].explained > 1.0
+    taken = tried.outdone[own, key("torque_ripple")]
+    assert taken.explained > 1.0
+    assert taken.short < 0.0
+    assert taken.left == tried.looked[own][0] == now.fit.statistic
     assert ("torque_ripple", "hip") in tries
     # every other one that was tried does less, and is not tried once more with what it promised
     tries.clear()
@@ -122,3 +127,19 @@ def test_whatever_explains_a_part_of_what_the_right_effect_does_is_compared(ripp
     some = {c.key for c in scan(bench, reduced, right.noise, instead_of=sought(reduced, right.fit, right.noise))}
     assert len(most) > 1
     assert most <= some
+
+
+def test_a_search_notes_by_how_much_others_fell_short_of_what_it_took(rippled):
+    bench, start, _ = rippled
+    tried, smallest = Tried(), np.full(len(bench.data.equations), 1e-3)
+    # the right one comes last, or nothing else would be tried
+    names = ("position_dependent_friction", "torque_ripple")
+    found = [c for c in scan(bench, start.fit, start.noise) if c.effect.name in names and c.effect.joint == "hip"]
+    found.sort(key=lambda c: names.index(c.effect.name))
+    best, _ = next_effect(bench, start, found, 1000, smallest, tried)
+    explained = start.fit.statistic - best.statistic
+    others = {rival: last for (_, rival), last in tried.outdone.items() if rival != effect_key(best.effects[-1])}
+    assert others
+    for last in others.values():
+        assert last.left == best.statistic
+        assert last.short == pytest.approx((1.0 - last.explained) * explained)

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.diagnosis import _gap
 from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
@@ -35,6 +37,17 @@ def test_forces_and_torques_are_compared_beside_their_noise():
     gap = Gap(*sizes, alike)
     assert "at lift, where it was largest." in _gap_sentence(gap, alike)
     assert gap.shrink == pytest.approx(1.0 - 0.1 / np.hypot(2.0, 0.5)) == Gap(*sizes).shrink
+
+
+def test_a_gap_knows_its_units(nothing_missing):
+    bench, now = nothing_missing
+    assert gap_of(bench, now.fit, now.fit, now.noise).units == dict.fromkeys(bench.robot.joint_names, "N m")
+    read = {
+        "before": {"lift": 1.0, "turn": 1.0},
+        "after": {"lift": 0.0, "turn": 0.0},
+        "noise": {"lift": 1.0, "turn": 1.0},
+    }
+    assert _gap(read, {"lift": "N", "turn": "N m"}).mixed
 
 
 def facts(verdict, periods=12, remainder=0.0, p_value=0.0, sound=True, trends=()):
