@@ -191,38 +191,45 @@ def transfer(
     Returns:
         One result for each of them.
     """
-    fit, noise = selection.final.fit, now.noise
-    first = len(fit.effects) - selection.added
-    base = list(fit.effects[:first])
-    added = list(range(first, len(fit.effects)))
-    out = []
-    for position in added if positions is None else positions:
-        others = [p for p in added if p != position]
-        signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
-        own_signal = [fit.effects[position]] if isinstance(fit.effects[position], SignalEffect) else []
-        start = fit.parameters
-        known = _known(bench, fit, others)
-        beside = [*base, *signals, *_history(fit, others)]
-        without = bench.fit(beside, noise, start=start, tangents=False, known=known)
-        whole = _known(bench, fit, added)
-        fixed = bench.fit([*beside, *own_signal], noise, start=start, tangents=False, known=whole)
-        unit = now.fit.unit
-        remembers = False
-        if own_history := _history(fit, [position]):
-            rested = bench.fit([*beside, *own_history], noise, start=start, tangents=False, known=whole)
-            remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
-            fixed = rested if remembers else fixed
-        free = (
-            bench.refine([*base, *signals, fit.effects[position]], noise, start=start, only=len(base) + len(signals))
-            if not others
-            else now.fit
-        )
-        possible = without.statistic - min(free.statistic, fixed.statistic)
-        columns = max(len(fit.effects[position].columns(bench.robot)), 1)
-        tested = significance(possible, columns, 10, without, noise) < FAMILY_LEVEL
-        share = (without.statistic - fixed.statistic) / possible if possible > 0.0 else 0.0
-        out.append(Transfer(float(share), bool(tested), fixed.statistic, unit, fixed.excess, remembers))
-    return out
+    fit = selection.final.fit
+    added = range(len(fit.effects) - selection.added, len(fit.effects))
+    return [_transfer_of(bench, fit, added, now, position) for position in (added if positions is None else positions)]
+
+
+def _transfer_of(bench: Bench, fit: Fit, added: range, now: Settled, position: int) -> Transfer:
+    """What one effect of a model is worth on other data beside all others that were added, these as they are."""
+    effect, noise, start = fit.effects[position], now.noise, fit.parameters
+    others = [p for p in added if p != position]
+    signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
+    own_signal = [effect] if isinstance(effect, SignalEffect) else []
+    known, whole = _known(bench, fit, others), _known(bench, fit, added)
+    beside = [*fit.effects[: added.start], *signals, *_history(fit, others)]
+    without = bench.fit(beside, noise, start=start, tangents=False, known=known)
+    fixed = bench.fit([*beside, *own_signal], noise, start=start, tangents=False, known=whole)
+    unit = now.fit.unit
+    remembers = False
+    if own_history := _history(fit, [position]):
+        rested = bench.fit([*beside, *own_history], noise, start=start, tangents=False, known=whole)
+        remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
+        fixed = rested if remembers else fixed
+    columns = max(len(effect.columns(bench.robot)), 1)
+
+    def alone() -> Fit:
+        """With its parameters and shapes free, those of the others as they are."""
+        return bench.refine([*beside, effect], noise, start=start, only=len(beside), known=known)
+
+    def tells(gain: float) -> bool:
+        return bool(significance(gain, columns, 10, without, noise) < FAMILY_LEVEL)
+
+    possible = without.statistic - min((now.fit if others else alone()).statistic, fixed.statistic)
+    tested, share = tells(possible), 0.0
+    if possible > 0.0:
+        share = float((without.statistic - fixed.statistic) / possible)
+    harm = fixed.statistic - without.statistic
+    if tested and others and share <= TRANSFERS and harm < EQUALLY_GOOD * unit:
+        # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
+        tested = tells(without.statistic - alone().statistic)
+    return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
 
 
 def _history(fit: Fit, positions: Sequence[int]) -> list[Effect]:

@@ -8,7 +8,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
 from sea_ident.discrepancy.linear import off, span
 from sea_ident.discrepancy.noise import (
@@ -88,6 +88,7 @@ class Bench(ParameterFits):
         only: int = 0,
         rounds: int = 12,
         beat: float = np.inf,
+        known: Known | None = None,
     ) -> Fit:
         """Fit parameters and shapes together: Gauss-Newton on the shapes, the parameters solved for in every step.
 
@@ -98,11 +99,12 @@ class Bench(ParameterFits):
             only: position from which on shapes are refined; those before keep theirs, for a quick look.
             rounds: largest number of steps.
             beat: statistic that is of interest; what is far above and comes down too slowly is given up.
+            known: what is there beside the model.
 
         Returns:
             The fit.
         """
-        fit = self.fit(effects, noise, start=start, tangents=False)
+        fit = self.fit(effects, noise, start=start, tangents=False, known=known)
         for _ in range(rounds):
             better = self._refine_step(fit, noise, only)
             if better is None:
@@ -111,7 +113,7 @@ class Bench(ParameterFits):
             fit = better
             if gain < 0.05 + STANDS_STILL * fit.excess or fit.statistic - HOPE * gain > beat:
                 break
-        return self.fit(fit.effects, noise, start=fit.parameters)
+        return self.fit(fit.effects, noise, start=fit.parameters, known=known)
 
     def _refine_step(self, fit: Fit, noise: NoiseFloor, only: int) -> Fit | None:
         shapes = tuple((k, shape) for k, shape in free_shapes(fit.effects) if k >= only)
@@ -138,7 +140,7 @@ class Bench(ParameterFits):
             # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
             ahead = fit.values + follow @ step
             start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
-            new = self.fit(effects, noise, start=start, tangents=False)
+            new = self.fit(effects, noise, start=start, tangents=False, known=fit.known)
             slack = len(self.slack_links(new)) > len(self.slack_links(fit))
             if new.statistic < fit.statistic and not slack and not self._runs_away(fit, new):
                 return new

@@ -27,7 +27,7 @@ ONLY_AGAINST_REFERENCE = ("payload",)
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
 
-FEW_SHAPES = 24
+FEW_SHAPES = 48
 """Shapes of one effect up to which those that single precision leaves in doubt are looked at one by one."""
 
 LARGEST_OF_MANY = 0.5

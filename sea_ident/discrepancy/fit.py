@@ -13,6 +13,19 @@ from sea_ident.effects import Column, Effect, Shape
 
 
 @dataclass(frozen=True, eq=False)
+class Known:
+    """What is there beside a model that is fitted.
+
+    Attributes:
+        torque: (H + 1, E) [N m].
+        stiffness: (E,) what it adds to the slope of the spring torque of a link over its deflection.
+    """
+
+    torque: ComplexArray
+    stiffness: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A model fitted to the mean residual, everything free.
 
@@ -28,6 +41,7 @@ class Fit:
             is wanted.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
         frame: (p, r) what makes `flat` nearly orthonormal, where no shape is free and it is known.
+        known: what is there beside the model; None where that is nothing.
     """
 
     effects: tuple[Effect, ...]
@@ -40,6 +54,7 @@ class Fit:
     linear: Callable[[], tuple[FloatArray, ComplexArray]]
     free_shapes: tuple[tuple[int, Shape], ...]
     frame: FloatArray | None = None
+    known: Known | None = None
 
     @property
     def statistic(self) -> float:
@@ -106,16 +121,3 @@ class Fit:
         """Columns of one effect, given the number of columns of every effect."""
         start = int(sum(robot_columns[:position]))
         return slice(start, start + int(robot_columns[position]))
-
-
-@dataclass(frozen=True, eq=False)
-class Known:
-    """What is there beside a model that is fitted.
-
-    Attributes:
-        torque: (H + 1, E) [N m].
-        stiffness: (E,) what it adds to the slope of the spring torque of a link over its deflection.
-    """
-
-    torque: ComplexArray
-    stiffness: FloatArray

@@ -139,7 +139,7 @@ class ParameterFits(Tangents):
             return flat, spectra
 
         frame = None if shapes else frame
-        return Fit(effects, columns, values, residual, scale, whitened, free, linear, shapes, frame)
+        return Fit(effects, columns, values, residual, scale, whitened, free, linear, shapes, frame, known)
 
     def _descend(
         self,

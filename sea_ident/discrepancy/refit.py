@@ -15,7 +15,7 @@ from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect, Shape
-from sea_ident.effects.backlash import Backlash
+from sea_ident.effects.backlash import NEARLY_HARD, Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
@@ -93,6 +93,8 @@ def refitted(
     if isinstance(effect, SpringEffect):
         best = _in_its_spring(bench, best, noise, len(before), beat)
         best = at_its_kink(bench, best, noise, len(before))
+    if isinstance(effect, Backlash):
+        best = _open(bench, best, noise, len(before))
     return with_sharp_edges(bench, best, noise, len(before), beat)
 
 
@@ -164,6 +166,39 @@ def _never_closed(bench: Bench, effect: Effect, fit: Fit) -> Effect:
     if np.ptp(np.sign(deflection)) or not stiffness > 0.0 or not own > 0.0 or effect.half_width > BEGINS * least:
         return effect
     return replace(effect, half_width=min(effect.half_width * own / stiffness, least / BEGINS))
+
+
+def _open(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """Play that is in no spring replaced by one that is, where the motion never closes that and it does as well.
+
+    On such a motion it is a constant torque, whatever the width. Soft ends follow a little of what else is there, with
+    a stiffness that is not that of the spring.
+
+    Args:
+        bench: the recording.
+        fit: the model with the play.
+        noise: noise floor.
+        position: of the play in it.
+    """
+    play = fit.effects[position]
+    if not isinstance(play, Backlash) or _in_series(fit, play):
+        return fit
+    tried = replace(play, softness=NEARLY_HARD)
+    for _ in range(IN_SERIES):
+        effects = list(fit.effects)
+        effects[position] = tried
+        new = bench.fit(effects, noise, start=fit.parameters)
+        if _in_series(new, tried) and new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit:
+            return new
+        last, tried = tried, _never_closed(bench, tried, new)
+        if tried == last:
+            break
+    return fit
+
+
+def _in_series(fit: Fit, play: Backlash) -> bool:
+    """Whether the stiffness of a play is about that of the spring that it is in."""
+    return play.plausible(np.array([fit.parameters[play.parameter_name()]]), fit.parameters)
 
 
 def _share(effect: SignalEffect, amount: Shape) -> float:

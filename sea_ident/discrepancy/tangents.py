@@ -56,12 +56,12 @@ class Tangents(Columns):
         return out
 
     def stiffness_of(self, fit: Fit) -> FloatArray:
-        """(E,) slope of the springs of a fit over their deflection."""
+        """(E,) slope of the springs of a fit over their deflection, with what is known beside it."""
         if self._stiffness is not None and self._stiffness[0] is fit:
             return self._stiffness[1]
         counts, signals = self.counts(fit.effects), signal_effects(fit.effects)
         begins = np.cumsum([0, *counts])
-        total = np.zeros(len(self.data.equations))
+        total = np.zeros(len(self.data.equations)) if fit.known is None else fit.known.stiffness.copy()
         for effect, begin, count in zip(fit.effects, begins, counts, strict=False):
             columns = fit.columns[begin : begin + count]
             if any(column.side is Side.SPRING for column in columns):
