@@ -110,7 +110,8 @@ def _in_its_spring(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, bea
     """
     for _ in range(MOST_LAWS):
         anchored = list(fit.effects)
-        anchored[position] = _never_closed(bench, bench.anchored(fit.effects, fit.parameters)[position], fit)
+        own = bench.anchored(fit.effects, fit.parameters)[position]
+        anchored[position] = _never_closed(bench, own, fit) if isinstance(own, Backlash) else own
         if tuple(anchored) == fit.effects:
             break
         last, fit = fit, bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects), beat=beat)
@@ -147,7 +148,7 @@ def _softened(
     return best
 
 
-def _never_closed(bench: Bench, effect: Effect, fit: Fit) -> Effect:
+def _never_closed(bench: Bench, play: Backlash, fit: Fit) -> Backlash:
     """Play that the motion never closes as wide as makes it one in the spring that it is in.
 
     Its torque is then about a constant, K times the width. A fit of both ends wherever it passes on that way, at worst
@@ -155,17 +156,15 @@ def _never_closed(bench: Bench, effect: Effect, fit: Fit) -> Effect:
 
     Args:
         bench: the recording.
-        effect: the effect.
+        play: the play.
         fit: the model with it.
     """
-    if not isinstance(effect, Backlash):
-        return effect
-    deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(effect.required_joint)]
-    stiffness = fit.parameters.get(f"{effect.joint}.spring_stiffness", 0.0)
-    least, own = float(np.min(np.abs(deflection))), fit.parameters[effect.parameter_name()]
-    if np.ptp(np.sign(deflection)) or not stiffness > 0.0 or not own > 0.0 or effect.half_width > BEGINS * least:
-        return effect
-    return replace(effect, half_width=min(effect.half_width * own / stiffness, least / BEGINS))
+    deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(play.required_joint)]
+    stiffness = fit.parameters.get(f"{play.joint}.spring_stiffness", 0.0)
+    least, own = float(np.min(np.abs(deflection))), fit.parameters[play.parameter_name()]
+    if np.ptp(np.sign(deflection)) or not stiffness > 0.0 or not own > 0.0 or play.half_width > BEGINS * least:
+        return play
+    return replace(play, half_width=min(play.half_width * own / stiffness, least / BEGINS))
 
 
 def _open(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:

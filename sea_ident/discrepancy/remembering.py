@@ -1,15 +1,15 @@
-"""A constant torque of a spring that is another constant in another motion: dry friction in it remembers.
+"""A constant torque of a spring that is none in another motion: dry friction in it remembers.
 
 An element of spring and dry friction that does not slip is elastic. It adds to the stiffness of the spring, and where
 it slipped last to its zero. On one motion that is a constant in the spring, and is to be called one. Where another
-motion finds another constant there, nothing constant is missing: such an element does that, and nothing else that the
-library has.
+motion finds another constant there, or the element slips there, nothing constant is missing: such an element does that,
+and nothing else that the library has. Where it slips is then read from the other motion.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
@@ -19,6 +19,7 @@ from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Effect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 
@@ -28,15 +29,21 @@ CONFIRMED = 0.99
 MOST_OF_IT = 0.5
 """Share of what is left there that such an element must explain where the constant is the same [-]."""
 
-SLIPS = (0.05, 2.0)
-"""Deflections at which an element may slip for all that this motion shows, as shares of the travel of the spring: the
-least, where a motion goes to and fro once and presses on after, and beyond half of it, where it does not slip [-], ..."""
+STICKS = (0.5, 0.75, 1.0, 1.5, 2.0)
+"""Deflections from which on an element does not slip to and fro, as shares of the travel of its spring [-]."""
 
-TRIED = 24
-"""... how many of them are tried, ..."""
+BARELY = 1.001
+"""Factor that keeps an element that is about to slip from it [-]."""
 
-CLOSER = 0.002
-"""... and how close the best is come to, as a share of it [-]."""
+SLIPS = (0.05, 1.0)
+"""Those at which it may slip on the other motion for all that the one that was used shows: that may go to and fro once
+and press on after [-], ..."""
+
+TRIED = 20
+"""... how many of them are tried there, ..."""
+
+REFINED = 3
+"""... and how many of these are refined."""
 
 
 def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int) -> Alternative | None:
@@ -61,38 +68,49 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
     if effect_key(SpringHysteresis(effect.joint)) in {effect_key(each) for each in now.effects}:
         return None
     travel = float(np.ptp(bench.state(now.effects).motion.deflection[:, bench.robot.index(effect.required_joint)]))
-    enough = found.excess * (MOST_OF_IT if found.share > CONFIRMED else 1.0)
-    tried: dict[float, tuple[float, Fit | None]] = {}
-
-    def left(log_slip: float) -> float:
-        """What is left on the other motion by an element that slips there, more than anything where it cannot be."""
-        slip = float(np.exp(log_slip))
-        fit = _instead(bench, selection, position, SpringHysteresis(joint=effect.joint, slip=slip))
-        excess = np.inf
-        if fit is not None:
-            excess = held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position).excess
-        tried[slip] = excess, fit
-        return min(excess, 1e300)
-
-    slips = np.log(np.geomspace(*SLIPS, TRIED) * travel)
-    best = int(np.argmin([left(slip) for slip in slips]))
-    around = slips[max(best - 1, 0)], slips[min(best + 1, TRIED - 1)]
-    minimize_scalar(left, bounds=around, method="bounded", options={"xatol": CLOSER})
-    excess, fit = min(tried.values(), key=lambda each: each[0])
-    if fit is None or excess > enough:
+    sticking, slipping = (
+        [SpringHysteresis(effect.joint, float(share) * travel) for share in shares]
+        for shares in (BARELY * np.array(STICKS), np.geomspace(*SLIPS, TRIED))
+    )
+    tried: list[tuple[Effect, Mapping[str, float]]] = [(element, now.parameters) for element in sticking]
+    tried.extend((f.effects[position], f.parameters) for f in _on_the_other(held, selection, position, slipping))
+    best: tuple[float, Fit] | None = None
+    for element, start in tried:
+        fit = _here(bench, selection, position, element, start)
+        if fit is None:
+            continue
+        left = held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position).excess
+        if best is None or left < best[0]:
+            best = left, fit
+    if best is None or best[0] > found.excess * (MOST_OF_IT if found.share > CONFIRMED else 1.0):
         return None
-    return Alternative(SpringHysteresis.name, effect.joint, 1.0, fit, dearer=True)
+    return Alternative(SpringHysteresis.name, effect.joint, 1.0, best[1], dearer=True)
 
 
-def _instead(bench: Bench, selection: Selection, position: int, effect: SpringHysteresis) -> Fit | None:
-    """A selection with such an effect at a position; None where it does not do as well on the motion that was used."""
+def _on_the_other(held: HeldOut, selection: Selection, position: int, elements: Sequence[Effect]) -> list[Fit]:
+    """A selection with the best of some elements at a position, fitted to the other motion: what slips shows there."""
+    final, noise = selection.final.fit, held.noise
+    fits = []
+    for element in elements:
+        effects = list(final.effects)
+        effects[position] = element
+        fits.append(held.bench.fit(effects, noise, start=final.parameters, tangents=False))
+    fits.sort(key=lambda fit: fit.statistic)
+    return [held.bench.refine(fit.effects, noise, start=fit.parameters, only=position) for fit in fits[:REFINED]]
+
+
+def _here(bench: Bench, selection: Selection, position: int, element: Effect, start: Mapping[str, float]) -> Fit | None:
+    """A selection with an element at a position; None where it does not do as well on the motion that was used.
+
+    What that does not tell, as which of two that do not slip is the stiffer one, stays about as it was at the start.
+    """
     now = selection.final.fit
     effects = list(now.effects)
-    effects[position] = effect
-    fit = bench.fit(effects, selection.final.noise, start=now.parameters)
+    effects[position] = element
+    fit = bench.fit(effects, selection.final.noise, start=start)
     if fit.statistic - now.statistic > EQUALLY_GOOD * now.unit:
         return None
-    stiff = fit.parameters[f"{effect.joint}.spring_stiffness"] > 0.0
-    if not stiff or any(fit.parameters[column.name] < 0.0 for column in effect.columns(bench.robot)):
+    stiff = fit.parameters[f"{element.joint}.spring_stiffness"] > 0.0
+    if not stiff or any(fit.parameters[column.name] < 0.0 for column in element.columns(bench.robot)):
         return None
     return fit

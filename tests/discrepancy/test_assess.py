@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.assess import no_worse, rivals, transfer
+from sea_ident.discrepancy.assess import _known, no_worse, rivals, transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
@@ -151,3 +151,35 @@ def test_a_shape_that_the_first_motion_leaves_open_is_taken_as_the_other_has_it(
 def test_where_no_form_is_right_what_leaves_little_more_is_no_worse(statistic, gain, difference):
     fit = SimpleNamespace(statistic=statistic, unit=statistic / 600, excess=max(statistic - 600.0, 0.0))
     assert no_worse(fit, gain) == pytest.approx(difference)
+
+
+def test_what_others_gain_by_a_refit_does_not_count_against_what_another_motion_hardly_shows(laboratory):
+    """The ripple of the hip is twice as large there, and the other too small to be seen: nothing speaks against it."""
+    small = ("torque_ripple", "ankle", [0.002, 0.0], {"order": 30.0})
+    once, twice = ([("torque_ripple", "hip", [a, 0.5 * a], {"order": 4.0}), small] for a in (1.0, 2.0))
+    bench = laboratory.bench(laboratory.record(once))
+    start = settle(bench, bench.effects)
+    added = (make_effect(name, joint, **shapes) for name, joint, _, shapes in once)
+    selection = Selection(start, settle(bench, (*bench.effects, *added)), 2, (1e-9, 1e-9))
+    other = Bench(laboratory.data(laboratory.record(twice, motion=1, seed=8)), bench.effects)
+    fit = selection.final.fit
+    now = settle_again(other, other.predicted(fit.effects, fit.parameters))
+    shown, hardly = transfer(other, selection, now)
+    assert shown.tested
+    assert shown.holds
+    assert hardly.holds
+    assert not hardly.tested
+
+
+def test_fitted_beside_what_is_known_an_effect_comes_out_as_it_does_with_all_free(preloaded):
+    """What is known is a part of the stiffness that scales the residual too."""
+    bench, _, selection = preloaded
+    noise, first = selection.final.noise, len(selection.start.fit.effects)
+    kinked = make_effect("asymmetric_spring", "hip", kink=0.001)
+    whole = bench.refine((*selection.start.fit.effects, kinked, make_effect("spring_offset", "knee")), noise)
+    known = _known(bench, whole, [first])
+    others = [effect for k, effect in enumerate(whole.effects) if k != first]
+    fit = bench.refine(others, noise, start=whole.parameters, known=known)
+    assert known.stiffness.any()
+    np.testing.assert_allclose(bench.stiffness_of(fit), bench.stiffness_of(whole), rtol=1e-3)
+    assert fit.statistic == pytest.approx(whole.statistic, rel=1e-6)

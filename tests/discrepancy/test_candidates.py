@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import candidates, periods
-from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.candidates import FEW_SHAPES, candidate_effects, scan
+from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import penalty
-from sea_ident.effects import make_effect
+from sea_ident.effects import Side, make_effect
 
 OFFSETS = (0.0123, 0.012341)
 
@@ -73,3 +74,11 @@ def test_the_noise_is_the_same_behind_a_rounded_error_of_an_encoder(laboratory, 
         floors.append(behind_an_offset(laboratory, OFFSETS[1])[2].std)
     np.testing.assert_allclose(floors[0], floors[1], rtol=1e-4)
     assert np.any(floors[0] != floors[1])
+
+
+def test_every_shape_of_a_spring_is_looked_at_where_it_is_like_the_spring(nothing_missing):
+    """On a small travel to one side all that is in a spring is nearly its stiffness, to single precision."""
+    bench, now = nothing_missing
+    for effect in candidate_effects(bench, now.fit.effects):
+        if effect.side is Side.SPRING and not is_signal(effect):
+            assert len(effect.variants(bench.state(now.fit.effects))) <= FEW_SHAPES, effect.name

@@ -1,12 +1,14 @@
 """A model with another effect: what cannot win is given up, what can is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
-from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.refit import _open, refitted
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
@@ -112,3 +114,28 @@ def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing)
     found = soft.effects[-1]
     assert np.log(found.half_width / shapes["half_width"]) == pytest.approx(0.0, abs=3.0 * soft.std(widths))
     assert np.log(found.softness / shapes["softness"]) == pytest.approx(0.0, abs=3.0 * soft.std(softness))
+
+
+def test_play_in_no_spring_gives_way_to_play_that_is_never_closed(laboratory, nothing_missing):
+    """Narrow play in a spring of its own is the same constant, and cannot be."""
+    bench, _ = nothing_missing
+    deflection = bench.data.motion.deflection
+    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
+    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    width, stiffness = 0.3 * least, bench.robot.spring(name).stiffness
+    bench = laboratory.bench(laboratory.record([("spring_offset", name, [-stiffness * width], {})], periods=6))
+    start = settle(bench, bench.effects)
+    narrow = make_effect("backlash", name, half_width=0.2 * width)
+    fit = bench.fit((*start.fit.effects, narrow), start.noise, start=start.fit.parameters)
+    assert not physical(bench, fit, -1)
+    found = _open(bench, fit, start.noise, len(start.fit.effects))
+    assert physical(bench, found, -1)
+    assert found.effects[-1].half_width == pytest.approx(width, rel=0.1)
+    assert found.statistic - fit.statistic < EQUALLY_GOOD * fit.unit
+    # but where the motion shows that it is never so wide, what was found stays
+    assert (
+        _open(bench, replace(fit, whitened=0.5 * fit.whitened), start.noise, len(start.fit.effects)).effects[-1]
+        is narrow
+    )
+    # and what is possible is left as it is
+    assert _open(bench, found, start.noise, len(start.fit.effects)) is found

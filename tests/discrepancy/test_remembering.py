@@ -1,10 +1,12 @@
 """A constant in a spring that another motion does not confirm: dry friction that does not slip remembers it."""
 
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.decide import decide
 from sea_ident.discrepancy.heldout import tried
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
@@ -46,3 +48,26 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         # it never slips on the motion that was used
         travel = bench.data.motion.deflection[:, bench.robot.index(JOINT)]
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
+
+
+def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laboratory):
+    """The constant is the same on both, and what tells is left on the other motion while it slips."""
+    slip = 0.012
+    planted = [("spring_hysteresis", JOINT, [1.0, 3.0], {"slip": slip})]
+    used, other = (laboratory.bench(laboratory.record(planted, periods=8, motion=m)) for m in (1, 0))
+    travel = [np.ptp(bench.data.motion.deflection[:, bench.robot.index(JOINT)]) for bench in (used, other)]
+    assert travel[0] < 2.0 * slip < travel[1]
+    start = settle(used, used.effects)
+    now = settle(used, (*used.effects, make_effect("spring_offset", JOINT)))
+    # nothing is missing on the motion that was used
+    assert now.fit.statistic < 1.2 * now.fit.dof
+    selection = Selection(start, now, 1, (1e-9,))
+    held = tried(other, selection, "another motion")
+    before = held.transfers[0]
+    assert before.excess > EQUALLY_GOOD * before.unit
+    found, left, held = decide(used, selection, {len(start.fit.effects): ()}, held)
+    (effect,) = found.effects
+    assert effect.name == "spring_hysteresis"
+    assert effect.slip == pytest.approx(slip, rel=0.05)
+    assert left[len(start.fit.effects)] == ()
+    assert held.transfers[0].excess < 0.2 * before.excess
