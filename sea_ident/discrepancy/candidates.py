@@ -250,10 +250,10 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
         flat = whiten(model.whitener[:, :, touched], scaled)
     norms = np.sqrt(np.sum(flat**2, axis=0))
     flat /= np.where(norms > 0.0, norms, 1.0)
-    shadow = (model.basis.T @ flat.astype(np.float32)).astype(np.float64).reshape(-1, count, width)
+    shadow = model.basis.T @ flat.astype(np.float32)
     shaped = flat.reshape(len(flat), count, width)
-    gram = np.einsum("mvk,mvl->vkl", shaped, shaped) - np.einsum("mvk,mvl->vkl", shadow, shadow)
-    score = np.einsum("mvk,m->vk", shaped, left)
+    gram = _inner_products(flat, width) - _inner_products(shadow, width).astype(np.float64)
+    score = (left @ flat).reshape(count, width)
     scale = np.sqrt(np.maximum(np.einsum("vkk->vk", gram), 0.0))
     visible = scale**2 > SINGLE_PRECISION
     score = np.where(visible, score, 0.0)
@@ -283,6 +283,14 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
         norms=tuple(norms.reshape(count, width)[v] for v in tries),
         tests=count,
     )
+
+
+def _inner_products(columns: NDArray[np.floating], width: int) -> NDArray[np.floating]:
+    """(v, k, k) inner products of the columns (M, v k) of each of several shapes with one another."""
+    if width == 1:
+        return np.sum(columns**2, axis=0)[:, None, None]
+    each = columns.reshape(len(columns), -1, width).transpose(1, 0, 2)
+    return each.transpose(0, 2, 1) @ each
 
 
 def _exactly(
@@ -329,7 +337,8 @@ def _allowed_part(bench: Bench, effect: Effect, across: FloatArray, left: FloatA
         return np.maximum(_estimates(across, left), lower)
     if np.any(usable):
         bounds = (np.array(lower)[usable], np.full(int(usable.sum()), np.inf))
-        values[usable] = lsq_linear(across[:, usable], left, bounds).x
+        basis, triangle = np.linalg.qr(across[:, usable])
+        values[usable] = lsq_linear(triangle, basis.T @ left, bounds, method="bvls").x
     return values
 
 
