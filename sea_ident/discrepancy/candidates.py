@@ -252,7 +252,7 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
     flat /= np.where(norms > 0.0, norms, 1.0)
     shadow = model.basis.T @ flat.astype(np.float32)
     shaped = flat.reshape(len(flat), count, width)
-    gram = _inner_products(flat, width) - _inner_products(shadow, width).astype(np.float64)
+    gram = _inner_products(flat, width) - _inner_products(shadow, width)
     score = (left @ flat).reshape(count, width)
     scale = np.sqrt(np.maximum(np.einsum("vkk->vk", gram), 0.0))
     visible = scale**2 > SINGLE_PRECISION
@@ -285,12 +285,12 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
     )
 
 
-def _inner_products(columns: NDArray[np.floating], width: int) -> NDArray[np.floating]:
+def _inner_products(columns: NDArray[np.floating], width: int) -> FloatArray:
     """(v, k, k) inner products of the columns (M, v k) of each of several shapes with one another."""
     if width == 1:
-        return np.sum(columns**2, axis=0)[:, None, None]
+        return np.asarray(np.sum(columns**2, axis=0)[:, None, None], dtype=np.float64)
     each = columns.reshape(len(columns), -1, width).transpose(1, 0, 2)
-    return each.transpose(0, 2, 1) @ each
+    return np.asarray(each.transpose(0, 2, 1) @ each, dtype=np.float64)
 
 
 def _exactly(
