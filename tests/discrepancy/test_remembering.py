@@ -7,6 +7,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.decide import decide
 from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.remembering import CONFIRMED, remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
@@ -71,3 +72,16 @@ def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laborato
     assert effect.slip == pytest.approx(slip, rel=0.05)
     assert left[len(start.fit.effects)] == ()
     assert held.transfers[0].excess < 0.2 * before.excess
+
+
+def test_what_else_is_missing_on_the_other_motion_is_no_reason_for_such_an_element(laboratory, offset):
+    """The constant is the same there, and hardly anything of what is left would be explained."""
+    bench, selection = offset
+    ripple = ("torque_ripple", JOINT, [0.3, 0.1], {"order": 5.0})
+    recording = laboratory.record([("spring_offset", JOINT, [HERE], {}), ripple], periods=8, seed=9, motion=1)
+    held = tried(Bench(laboratory.data(recording), bench.effects), selection, "another motion")
+    (found,) = held.transfers
+    assert found.excess > EQUALLY_GOOD * found.unit
+    assert found.tested
+    assert found.share > CONFIRMED
+    assert remembering(bench, selection, held, len(selection.start.fit.effects)) is None
