@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from sea_ident.discrepancy import candidates, periods
 from sea_ident.discrepancy.candidates import FEW_SHAPES, candidate_effects, scan
@@ -82,3 +83,26 @@ def test_every_shape_of_a_spring_is_looked_at_where_it_is_like_the_spring(nothin
     for effect in candidate_effects(bench, now.fit.effects):
         if effect.side is Side.SPRING and not is_signal(effect):
             assert len(effect.variants(bench.state(now.fit.effects))) <= FEW_SHAPES, effect.name
+
+
+def test_estimates_that_must_not_be_negative_are_those_of_a_bounded_least_squares(nothing_missing):
+    """Both columns of a spring with dry friction must not be negative; where the target asks for it, one is zero."""
+    bench, _ = nothing_missing
+    effect = make_effect("spring_hysteresis", "knee")
+    rng = np.random.default_rng(5)
+    columns = rng.standard_normal((40, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
+    for wanted in ([1.0, 2.0], [-1.0, 2.0], [2.0, -1.0], [-1.0, -1.0]):
+        target = columns @ np.array(wanted) + 0.01 * rng.standard_normal(40)
+        expected = lsq_linear(columns, target, (0.0, np.inf), tol=1e-12).x
+        found = candidates._allowed_part(bench, effect, columns, target)
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+        assert np.all(found >= 0.0)
+
+
+@pytest.mark.parametrize("width", [1, 2, 3])
+def test_inner_products_are_those_of_the_columns_of_each_shape(width):
+    columns = np.random.default_rng(6).standard_normal((30, 4 * width))
+    found = candidates._inner_products(columns, width)
+    for v in range(4):
+        own = columns[:, v * width : (v + 1) * width]
+        np.testing.assert_allclose(found[v], own.T @ own)

@@ -139,3 +139,14 @@ def test_play_in_no_spring_gives_way_to_play_that_is_never_closed(laboratory, no
     )
     # and what is possible is left as it is
     assert _open(bench, found, start.noise, len(start.fit.effects)) is found
+
+
+def test_play_that_is_fitted_is_held_against_play_that_is_never_closed(rippled, monkeypatch):
+    bench, start, _ = rippled
+    asked = []
+    monkeypatch.setitem(refitted.__globals__, "_open", lambda _, fit, *rest: asked.append(fit) or fit)
+    for name in ("backlash", "spring_offset"):
+        effect = make_effect(name, "hip")
+        refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters)
+    (fit,) = asked
+    assert fit.effects[-1].name == "backlash"
