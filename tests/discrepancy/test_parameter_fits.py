@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.fit import Known
+from sea_ident.effects import make_effect
+
 
 def test_columns_are_the_derivative_of_the_whitened_residual(rippled):
     """That of a link too, whose scale follows the stiffness that is fitted."""
@@ -37,3 +40,22 @@ def test_a_planted_effect_is_fitted_within_its_own_standard_errors(rippled):
     for k, planted in zip(found, (1.0, 0.5), strict=True):
         assert fit.values[k] == pytest.approx(planted, abs=4.0 * fit.std(k))
         assert fit.std(k) < 0.06
+
+
+def test_a_shape_is_refined_beside_what_is_known(rippled):
+    """A part of the ripple is known: what is left has the same order, and so much smaller amounts."""
+    bench, start, with_it = rippled
+    part = 0.3
+    sizes = {name: value for name, value in with_it.fit.parameters.items() if "torque_ripple" in name}
+    torque = bench.column_spectra(make_effect("torque_ripple", "hip", order=4.0), with_it.fit.effects)
+    known = Known(torque @ (part * np.array(list(sizes.values()))), np.zeros(len(bench.data.equations)))
+    model = (*start.fit.effects, make_effect("torque_ripple", "hip", order=4.2))
+    found = bench.refine(model, with_it.noise, start=start.fit.parameters, only=len(bench.effects), known=known)
+    assert found.known is known
+    count = len(found.columns)
+    assert found.effects[-1].order == pytest.approx(4.0, abs=3.0 * found.std(count + len(found.free_shapes) - 1))
+    for k, column in enumerate(found.columns):
+        if column.name in sizes:
+            assert found.values[k] == pytest.approx((1.0 - part) * sizes[column.name], abs=3.0 * found.std(k))
+    # as good as with all of it in the model
+    assert found.statistic == pytest.approx(with_it.fit.statistic, abs=5.0)
