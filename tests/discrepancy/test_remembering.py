@@ -51,10 +51,11 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
 
 
-def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laboratory):
+@pytest.mark.parametrize("amounts", [[1.0, 3.0], [2.0, 1.0]])
+def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laboratory, amounts):
     """The constant is the same on both, and what tells is left on the other motion while it slips."""
     slip = 0.0114
-    planted = [("spring_hysteresis", JOINT, [1.0, 3.0], {"slip": slip})]
+    planted = [("spring_hysteresis", JOINT, amounts, {"slip": slip})]
     used, other = (laboratory.bench(laboratory.record(planted, periods=8, motion=m)) for m in (1, 0))
     travel = [np.ptp(bench.data.motion.deflection[:, bench.robot.index(JOINT)]) for bench in (used, other)]
     assert travel[0] < 2.0 * slip < travel[1]
