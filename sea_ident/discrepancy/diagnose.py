@@ -37,6 +37,8 @@ from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_perio
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.one_thread import one_thread
@@ -228,6 +230,7 @@ def _tested(
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
+    constant = {e.joint for e in confirmed.selection.effects if isinstance(e, SpringOffset)}
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
@@ -240,7 +243,9 @@ def _tested(
         selection, alternatives = _with_alternatives(bench, left if other is None else other.selection)
         selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
         confirmed = (other or confirmed).less(selection)
-    return confirmed, alternatives, held, notes
+    slipping = [e.required_joint for e in confirmed.selection.effects if isinstance(e, SpringHysteresis)]
+    told = tuple(words.told_by_the_other_motion(joint) for joint in slipping if joint in constant)
+    return confirmed, alternatives, held, (*notes, *told)
 
 
 def _searched_beside(bench: Bench, left: Selection, ruled_out: set[Key]) -> Confirmed | None:

@@ -91,6 +91,14 @@ def slow_samples(data: PeriodData) -> str:
     )
 
 
+def told_by_the_other_motion(joint: str) -> str:
+    """That what a spring with dry friction was told by are data that were to test it."""
+    return (
+        f"dry friction in the spring of {joint!r} is a constant torque on the recording: that it is none, and where it "
+        "slips, was read from the motion that was held out. Test the repaired model on a third one"
+    )
+
+
 def stiction(found: Breakaway, unit: str) -> str:
     """That the passes show a motor to be let go later than it slides, and by how much."""
     return (

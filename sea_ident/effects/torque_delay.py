@@ -7,6 +7,7 @@ from typing import ClassVar
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Contribution, Shape
 from sea_ident.effects.signal import SignalEffect, ahead
+from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
 
@@ -24,6 +25,11 @@ class TorqueDelay(SignalEffect):
     name: ClassVar[str] = "torque_delay"
     source: ClassVar[str] = "Swevers, Verdonck, De Schutter, Dynamic model identification for industrial robots, 2007"
     amounts: ClassVar[tuple[Shape, ...]] = (Shape("delay", "s", -0.05, 0.05, logarithmic=False),)
+
+    def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
+        """The speed of the motor when the recorded torque acts: that is when its friction jumps in the record."""
+        i = self.required_index(robot)
+        return i, ahead(motion.time, motion.dtheta[:, i], self.delay)
 
     def shifted(self, robot: Robot, time: FloatArray, rows: Contribution) -> Contribution:
         """The rows that give the torque of this motor, ahead of time."""

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.decide import decide
+from sea_ident.discrepancy.diagnose import _tested
 from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.remembering import CONFIRMED, remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.effects import make_effect
 
 JOINT = "knee"
@@ -49,6 +52,17 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         # it never slips on the motion that was used
         travel = bench.data.motion.deflection[:, bench.robot.index(JOINT)]
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
+
+
+@pytest.mark.parametrize(("there", "told"), [(HERE, False), (0.4 * HERE, True)])
+def test_that_it_was_told_by_what_was_held_out_is_said(laboratory, offset, there, told):
+    bench, selection = offset
+    recording = laboratory.record([("spring_offset", JOINT, [there], {})], periods=8, seed=9, motion=1)
+    confirmed = Confirmed(selection, bench, selection.start, selection.final)
+    listed = {len(selection.start.fit.effects): ()}
+    _, _, _, notes = _tested(bench, confirmed, listed, TrendTest(1.0, (), False), recording)
+    assert [note for note in notes if "third" in note and JOINT in note] == list(notes)
+    assert bool(notes) == told
 
 
 @pytest.mark.parametrize("amounts", [[1.0, 3.0], [2.0, 1.0]])
