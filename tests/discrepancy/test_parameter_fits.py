@@ -46,7 +46,7 @@ def test_a_planted_effect_is_fitted_within_its_own_standard_errors(rippled):
 def test_a_shape_is_refined_beside_what_is_known(laboratory):
     """With the other ripple known it ends where it does with that in the model."""
     planted = [("torque_ripple", joint, [1.0, 0.5], {"order": 4.0}) for joint in ("hip", "knee")]
-    bench = laboratory.bench(laboratory.record(planted))
+    bench = laboratory.bench(laboratory.record(planted, periods=5))
     ripples = {joint: make_effect("torque_ripple", joint, order=4.2) for joint in ("hip", "knee")}
     start = settle(bench, (*bench.effects, *ripples.values()))
     whole = bench.refine(start.fit.effects, start.noise, start=start.fit.parameters, only=len(bench.effects))

@@ -54,7 +54,7 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
 
 
-@pytest.mark.parametrize(("there", "told"), [(HERE, False), (0.4 * HERE, True)])
+@pytest.mark.parametrize(("there", "told"), [pytest.param(HERE, False, marks=pytest.mark.slow), (0.4 * HERE, True)])
 def test_that_it_was_told_by_what_was_held_out_is_said(laboratory, offset, there, told):
     bench, selection = offset
     recording = laboratory.record([("spring_offset", JOINT, [there], {})], periods=8, seed=9, motion=1)
@@ -65,7 +65,7 @@ def test_that_it_was_told_by_what_was_held_out_is_said(laboratory, offset, there
     assert bool(notes) == told
 
 
-@pytest.mark.parametrize("amounts", [[1.0, 3.0], [2.0, 1.0]])
+@pytest.mark.parametrize("amounts", [pytest.param([1.0, 3.0], marks=pytest.mark.slow), [2.0, 1.0]])
 def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laboratory, amounts):
     """The constant is the same on both, and what tells is left on the other motion while it slips."""
     slip = 0.0114
