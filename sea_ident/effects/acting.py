@@ -1,5 +1,6 @@
 """How an effect acts in a simulation."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -42,3 +43,29 @@ class Action(Protocol):
 
     def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
         """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
+
+
+class JointAction(ABC):
+    """An action at a single joint that depends on the time and the state of that joint and on nothing else.
+
+    A simulator asks for it at several speeds at once, and without the state of the rest of the robot.
+
+    Attributes:
+        index: of the joint.
+        on_link: share of its torque in the link row, with its sign [-].
+        on_motor: share of its torque in the motor row, with its sign [-].
+    """
+
+    def __init__(self, index: int, on_link: float, on_motor: float) -> None:
+        self.index, self.on_link, self.on_motor = index, on_link, on_motor
+
+    @abstractmethod
+    def amounts(self, time: float, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N,) torques [N m] at a time [s], in the states (N,) of the joint."""
+
+    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+        """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
+        one = slice(self.index, self.index + 1)
+        amount = self.amounts(state.time, state.q[one], state.dq[one], state.theta[one], state.dtheta[one])[0]
+        link[self.index] += self.on_link * amount
+        motor[self.index] += self.on_motor * amount

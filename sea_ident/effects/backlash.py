@@ -83,10 +83,13 @@ class Backlash(SpringEffect):
         """-(c + r (d^3 - (d - c)^3))."""
         d = theta - q
         c = self._taken_up(d)
-        return -(c + self.cubic * (d**3 - (d - c) ** 3))[:, None]
+        left = d - c
+        return -(c + self.cubic * (d * d * d - left * left * left))[:, None]
 
     def _taken_up(self, deflection: FloatArray) -> FloatArray:
         """(N,) part of deflections (N,) that the play takes up."""
         w, spread = self.half_width, self.softness * self.half_width
-        low, high = (np.log1p(np.exp(-2.0 * np.abs(deflection - end) / spread)) for end in (-w, w))
-        return np.asarray(np.clip(deflection, -w, w) + 0.5 * spread * (low - high), dtype=np.float64)
+        beyond = np.abs(np.array([deflection + w, deflection - w])) * (-2.0 / spread)
+        low, high = np.log1p(np.exp(beyond, out=beyond), out=beyond)
+        within: FloatArray = np.minimum(np.maximum(deflection, -w), w)
+        return within + 0.5 * spread * (low - high)

@@ -12,7 +12,7 @@ and their sum is the row of a rigid joint, in which the spring cancels (paper, e
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.acting import Action, JointAction
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -38,6 +38,19 @@ class Side(StrEnum):
     SPRING = "spring"
     BOTH = "both"
     SENSOR = "sensor"
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Signs with which a torque at one joint enters its link row and its motor row; 0 where it does not."""
+        match self:
+            case Side.LINK:
+                return 1.0, 0.0
+            case Side.MOTOR:
+                return 0.0, 1.0
+            case Side.SPRING:
+                return -1.0, 1.0
+            case _:
+                return 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -348,19 +361,7 @@ class JointEffect(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The columns at the present state, times the values."""
-        i = robot.index(self.required_joint)
-        on_link = {Side.LINK: 1.0, Side.SPRING: -1.0}.get(self.side, 0.0)
-        on_motor = {Side.MOTOR: 1.0, Side.SPRING: 1.0}.get(self.side, 0.0)
-
-        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            row = self.local_columns(
-                state.q[i : i + 1], state.dq[i : i + 1], state.theta[i : i + 1], state.dtheta[i : i + 1]
-            )[0]
-            amount = float(row @ values)
-            link[i] += on_link * amount
-            motor[i] += on_motor * amount
-
-        return act
+        return ColumnsAction(self, robot, values)
 
     @property
     def required_joint(self) -> str:
@@ -377,6 +378,28 @@ class JointEffect(Effect):
         """Units of torque and of position of its joint: (N m, rad) or (N, m)."""
         joint = robot.joints[robot.index(self.required_joint)]
         return joint.torque_unit, joint.position_unit
+
+
+class ColumnsAction(JointAction):
+    """The columns of a `JointEffect` at the present state, times its values and what changes in time.
+
+    Args:
+        effect: the effect.
+        robot: the robot.
+        values: (k,) values of its parameters.
+        change: factor at a time [s]; one at all times where there is none.
+    """
+
+    def __init__(
+        self, effect: JointEffect, robot: Robot, values: FloatArray, change: Callable[[float], float] | None = None
+    ) -> None:
+        super().__init__(robot.index(effect.required_joint), *effect.side.shares)
+        self._columns, self._values, self._change = effect.local_columns, np.asarray(values, dtype=np.float64), change
+
+    def amounts(self, time: float, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N,) columns times values."""
+        amounts: FloatArray = self._columns(q, dq, theta, dtheta).dot(self._values)
+        return amounts if self._change is None else amounts * self._change(time)
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

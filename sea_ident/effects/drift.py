@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import Contribution, JointEffect, Shape, State
+from sea_ident.effects.acting import Action
+from sea_ident.effects.base import ColumnsAction, Contribution, JointEffect, Shape, State
 from sea_ident.robot import Robot
 
 _MINUTE = 60.0
@@ -72,14 +72,4 @@ class DriftEffect(JointEffect, TrendEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The columns at the present state and time, times the values."""
-        steady = super().torque(robot, values)
-        scratch = np.zeros((2, robot.n))
-
-        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            scratch[:] = 0.0
-            steady(state, scratch[0], scratch[1])
-            change = float(warming(np.array(state.time), self.time_constant))
-            link += change * scratch[0]
-            motor += change * scratch[1]
-
-        return act
+        return ColumnsAction(self, robot, values, lambda time: float(warming(np.array(time), self.time_constant)))

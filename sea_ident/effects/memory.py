@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import JointEffect, Side
+from sea_ident.effects.acting import Action, JointAction, SimulationState
+from sea_ident.effects.base import JointEffect
 from sea_ident.effects.signal import is_closed
 from sea_ident.robot import Robot
 
@@ -55,7 +55,7 @@ class MemoryEffect(JointEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """An action that keeps its memory; the simulator tells it by `accept` which states count."""
-        return MemoryAction(self, robot.index(self.required_joint), np.asarray(values, dtype=np.float64))
+        return MemoryAction(self, robot, values)
 
 
 class OneWayEffect(MemoryEffect):
@@ -81,43 +81,35 @@ class OneWayEffect(MemoryEffect):
         return self.advance_all(np.repeat(np.array(befores), lengths, axis=0), since)
 
 
-class MemoryAction:
+class MemoryAction(JointAction):
     """A `MemoryEffect` at work in a simulation.
 
-    Attributes:
+    Args:
         effect: the effect.
-        index: index of its joint.
+        robot: the robot.
         values: (k,) values of its parameters.
     """
 
-    def __init__(self, effect: MemoryEffect, index: int, values: FloatArray) -> None:
-        self.effect, self.index, self.values = effect, index, values
+    def __init__(self, effect: MemoryEffect, robot: Robot, values: FloatArray) -> None:
+        super().__init__(robot.index(effect.required_joint), *effect.side.shares)
+        self._effect, self._values = effect, np.asarray(values, dtype=np.float64)
         self._memory: tuple[float, ...] = (0.0,) * effect.memory_size
         self._position: float | None = None
-
-    def _path(self, state: SimulationState) -> float:
-        i = self.index
-        return float(self.effect.path(state.q[i : i + 1], state.theta[i : i + 1])[0])
 
     def _at(self, position: float) -> tuple[float, ...]:
         if self._position is None:
             self._position = position
-        return self.effect.advance(self._memory, position - self._position)
+        return self._effect.advance(self._memory, position - self._position)
 
-    def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-        """Add the torque of a trial state."""
-        i = self.index
-        memory = np.array([self._at(self._path(state))])
-        amount = float(self.effect.remembered_columns(memory, state.dtheta[i : i + 1])[0] @ self.values)
-        if self.effect.side is Side.LINK:
-            link[i] += amount
-        else:
-            motor[i] += amount
-        if self.effect.side is Side.SPRING:
-            link[i] -= amount
+    def amounts(self, time: float, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """(N,) torques at a position of the joint, of a trial state."""
+        memory = np.array([self._at(position) for position in self._effect.path(q, theta).tolist()])
+        amounts: FloatArray = self._effect.remembered_columns(memory, dtheta).dot(self._values)
+        return amounts
 
     def accept(self, state: SimulationState) -> None:
         """Move the memory on to a state that is kept."""
-        position = self._path(state)
+        i = self.index
+        position = float(self._effect.path(state.q[i : i + 1], state.theta[i : i + 1])[0])
         self._memory = self._at(position)
         self._position = position

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import Anchor, Column, Contribution, JointEffect, Side, State, smooth_sign
+from sea_ident.effects.acting import Action
+from sea_ident.effects.base import Anchor, Column, ColumnsAction, Contribution, JointEffect, Side, State, smooth_sign
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -86,15 +86,7 @@ class TemperatureFriction(JointEffect, TrendEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """With the temperature that rises as `rise` and `time_constant` say."""
-        steady = super().torque(robot, values)
-        scratch = np.zeros((2, robot.n))
-
-        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            scratch[:] = 0.0
-            steady(state, scratch[0], scratch[1])
-            motor[:] += scratch[1] * (float(self.temperature(np.array(state.time))) - self.reference)
-
-        return act
+        return ColumnsAction(self, robot, values, lambda time: float(self.temperature(np.array(time))) - self.reference)
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """A thermometer beside the other sensors."""

@@ -36,7 +36,11 @@ class TorqueRipple(JointEffect):
 
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Sine and cosine of n theta."""
-        return np.stack([np.sin(self.order * theta), np.cos(self.order * theta)], axis=1)
+        angle = self.order * theta
+        columns = np.empty((len(angle), 2))
+        np.sin(angle, out=columns[:, 0])
+        np.cos(angle, out=columns[:, 1])
+        return columns
 
     def variants(self, state: State) -> tuple["TorqueRipple", ...]:
         """All orders that this motion tells apart, up to those too fast for its samples."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, Side, SimulationState
+from sea_ident.effects.acting import Action, JointAction
 from sea_ident.effects.load import LoadEffect
 from sea_ident.exceptions import SimulationError
 from sea_ident.robot import Robot
@@ -31,7 +32,8 @@ def motor_coordinates(robot: Robot) -> list[int]:
 class PlantedTorques:
     """Torques of effects that act on the present state, with or without memory.
 
-    Coordinates are those of `ClosedLoop`: u = (q, theta of the elastic joints).
+    Coordinates are those of `ClosedLoop`: u = (q, theta of the elastic joints). What acts at a single joint is asked
+    for with the state of that joint alone: to put the state of the robot together takes longer than most effects.
 
     Attributes:
         needs_load: whether an effect asks for the load of a rigid joint.
@@ -46,8 +48,8 @@ class PlantedTorques:
         acting = [p for p in effects if p.effect.side is not Side.SENSOR and overrides(p.effect, "torque")]
         hooks = [(p.effect.side is Side.SPRING, p.effect.torque(robot, p.values)) for p in acting]
         # Springs first: the others may depend on the torque that they transmit.
-        self._springs = [hook for spring, hook in hooks if spring]
-        self._others = [hook for spring, hook in hooks if not spring]
+        self._joint_springs, self._springs = _by_kind([hook for spring, hook in hooks if spring], coordinates)
+        self._joint_others, self._others = _by_kind([hook for spring, hook in hooks if not spring], coordinates)
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
         self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
@@ -78,7 +80,7 @@ class PlantedTorques:
         state.tau_spring[:] = tau_spring
 
     def _act(self) -> list[float]:
-        """(size,) torques at the state that is set; springs change its spring torques."""
+        """(size,) torques of what depends on the robot, at the state that is set; springs change its spring torques."""
         state, link, motor = self._state, self._link, self._torque
         link[:] = 0.0
         motor[:] = 0.0
@@ -105,11 +107,17 @@ class PlantedTorques:
         out: list[float],
     ) -> None:
         """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
-        self._set(time, elapsed, u, w, tau_motor, tau_spring)
-        for i, torque in enumerate(self._act()):
-            out[i] -= torque
-        if self._springs:
-            tau_spring[:] = self._state.tau_spring.tolist()
+        counted = max(time, self._begin)
+        for at in self._joint_springs:
+            tau_spring[at.i] -= at.action.on_link * at.add(counted, u, w, out)
+        if self._springs or self._others:
+            self._set(time, elapsed, u, w, tau_motor, tau_spring)
+            for i, torque in enumerate(self._act()):
+                out[i] -= torque
+            if self._springs:
+                tau_spring[:] = self._state.tau_spring.tolist()
+        for at in self._joint_others:
+            at.add(counted, u, w, out)
 
     def add_damping(
         self,
@@ -121,18 +129,24 @@ class PlantedTorques:
         damping: list[float],
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
-        n = len(self._link)
-        self._set(time, 0.0, u, w, tau_motor, tau_spring)
-        base = self._act()
-        for side in (slice(0, n), slice(n, len(u))):
-            moved = w.copy()
-            moved[side] += np.where(w[side] >= 0.0, SMALL_SPEED, -SMALL_SPEED)
-            self._set(time, 0.0, u, moved, tau_motor, tau_spring)
-            changed = self._act()
-            for k in range(len(u))[side]:
-                slope = (changed[k] - base[k]) / (moved[k] - w[k])
-                if slope > 0.0:
-                    damping[k] += slope
+        slopes = [0.0] * self._size
+        counted = max(time, self._begin)
+        for at in (*self._joint_springs, *self._joint_others):
+            at.add_slopes(counted, u, w, slopes)
+        if self._springs or self._others:
+            n = len(self._link)
+            self._set(time, 0.0, u, w, tau_motor, tau_spring)
+            base = self._act()
+            for side in (slice(0, n), slice(n, len(u))):
+                moved = w.copy()
+                moved[side] += np.where(w[side] >= 0.0, SMALL_SPEED, -SMALL_SPEED)
+                self._set(time, 0.0, u, moved, tau_motor, tau_spring)
+                changed = self._act()
+                for k in range(len(u))[side]:
+                    slopes[k] += (changed[k] - base[k]) / (moved[k] - w[k])
+        for k, slope in enumerate(slopes):
+            if slope > 0.0:
+                damping[k] += slope
 
     def accept(
         self, time: float, u: FloatArray, w: FloatArray, tau_motor: list[float], tau_spring: list[float]
@@ -142,6 +156,49 @@ class PlantedTorques:
             self._set(time, 0.0, u, w, tau_motor, tau_spring)
             for accept in self._memory:
                 accept(self._state)
+
+
+class _AtJoint:
+    """What acts at joint i alone, whose motor has the coordinate m."""
+
+    __slots__ = ("_speeds", "action", "i", "m")
+
+    def __init__(self, action: JointAction, m: int) -> None:
+        self.action, self.i, self.m = action, action.index, m
+        # The present speeds, that of one side moved, that of the other: both move where there is no spring.
+        self._speeds = [np.zeros(2 if m == self.i else 3) for _ in range(2)]
+
+    def add(self, time: float, u: FloatArray, w: FloatArray, out: list[float]) -> float:
+        """Subtract the torque from the forces `out`, and return it."""
+        i, m, action = self.i, self.m, self.action
+        q, theta = slice(i, i + 1), slice(m, m + 1)
+        amount = float(action.amounts(time, u[q], w[q], u[theta], w[theta])[0])
+        out[i] -= action.on_link * amount
+        out[m] -= action.on_motor * amount
+        return amount
+
+    def add_slopes(self, time: float, u: FloatArray, w: FloatArray, slopes: list[float]) -> None:
+        """Add the slopes over the speeds of both sides."""
+        i, m, action = self.i, self.m, self.action
+        dq, dtheta = self._speeds
+        dq[:], dtheta[:] = w[i], w[m]
+        link, motor = (SMALL_SPEED if speed[0] >= 0.0 else -SMALL_SPEED for speed in (dq, dtheta))
+        dq[1] += link
+        dtheta[-1] += motor
+        positions = [np.full(len(dq), u[k]) for k in (i, m)]
+        changed = action.amounts(time, positions[0], dq, positions[1], dtheta)
+        change = (changed[1:] - changed[0]).tolist()
+        if m == i:
+            slopes[i] += (action.on_link + action.on_motor) * change[0] / link
+        else:
+            slopes[i] += action.on_link * change[0] / link
+            slopes[m] += action.on_motor * change[1] / motor
+
+
+def _by_kind(hooks: Sequence[Action], coordinates: Sequence[int]) -> tuple[list[_AtJoint], list[Action]]:
+    """What acts at a single joint, with the coordinate of its motor, and the others."""
+    at_joint = [_AtJoint(hook, coordinates[hook.index]) for hook in hooks if isinstance(hook, JointAction)]
+    return at_joint, [hook for hook in hooks if not isinstance(hook, JointAction)]
 
 
 def altered_robot(robot: Robot, effects: Sequence[PlantedEffect]) -> Robot:

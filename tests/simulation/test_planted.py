@@ -8,6 +8,7 @@ from plants import modest_series, ur10
 from sea_ident import SeaIdentError, build_regressor
 from sea_ident.effects import Column, JointEffect, Side, base_effects, make_effect, spring_effects
 from sea_ident.simulation import PlantedEffect, plant_from_robot, simulate
+from sea_ident.simulation.planted import PlantedTorques
 
 PLANTED = [
     ("torque_offset", [0.7]),
@@ -142,3 +143,72 @@ def test_effects_of_others_see_the_time_of_the_recording(leg, leg_series, quiet)
 def test_wrong_number_of_values_is_refused(leg, leg_series):
     with pytest.raises(SeaIdentError, match=r"link_friction.*2 parameters"):
         simulate(leg, leg_series, effects=[PlantedEffect(make_effect("link_friction", "hip"), np.zeros(1))])
+
+
+@dataclass(frozen=True)
+class Told(JointEffect):
+    """An effect at one joint that acts by a function of its own, of the state of the whole robot."""
+
+    of: JointEffect | None = None
+
+    name: ClassVar[str] = "told"
+    source: ClassVar[str] = "this test"
+
+    @property
+    def side(self):
+        return self.of.side
+
+    def columns(self, robot):
+        return self.of.columns(robot)
+
+    def local_columns(self, q, dq, theta, dtheta):
+        return self.of.local_columns(q, dq, theta, dtheta)
+
+    def torque(self, robot, values):
+        action = self.of.torque(robot, values)
+        return lambda state, link, motor: action(state, link, motor)
+
+
+DAMPING = [
+    ("viscous_friction", [0.7], {"motor": 0.7}),
+    ("link_friction", [0.3, 0.0], {"link": 0.3}),
+    ("spring_damping", [1.5], {"link": 1.5, "motor": 1.5}),
+    ("torque_offset", [0.7], {}),
+    ("viscous_friction", [-0.7], {}),
+]
+
+
+@pytest.mark.parametrize("alone", [True, False], ids=["state of the joint", "state of the robot"])
+@pytest.mark.parametrize(("name", "values", "expected"), DAMPING)
+def test_slopes_over_the_speeds_are_those_of_what_damps(leg, name, values, expected, alone):
+    effect = make_effect(name, "knee")
+    planted = PlantedEffect(effect if alone else Told("knee", effect), np.array(values))
+    torques = PlantedTorques(leg, [planted], 0.0)
+    rng = np.random.default_rng(0)
+    damping = [0.5] * 6
+    torques.add_damping(0.0, *rng.standard_normal((2, 6)), [0.0] * 3, [0.0] * 3, damping)
+    added = np.array([0.0, expected.get("link", 0.0), 0.0, 0.0, expected.get("motor", 0.0), 0.0])
+    np.testing.assert_allclose(np.array(damping) - 0.5, added, atol=1e-9)
+
+
+def test_slopes_of_a_rigid_joint_are_at_its_only_coordinate():
+    robot = ur10()
+    planted = PlantedEffect(make_effect("viscous_friction", "elbow_joint"), np.array([0.7]))
+    damping = [0.0] * 6
+    speeds = np.linspace(-1.0, 1.0, 6)
+    PlantedTorques(robot, [planted], 0.0).add_damping(0.0, np.zeros(6), speeds, [0.0] * 6, [0.0] * 6, damping)
+    np.testing.assert_allclose(damping, 0.7 * (np.arange(6) == robot.index("elbow_joint")), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("torque_ripple", [2.0, -1.0]), ("asymmetric_spring", [40.0]), ("friction_drift", [0.5, 1.0])],
+)
+def test_it_is_the_same_whether_asked_for_by_joint_or_with_the_whole_robot(leg, leg_series, quiet, name, values):
+    effect = make_effect(name, "knee")
+    runs = [
+        simulate(leg, leg_series, periods=1, effects=[PlantedEffect(each, np.array(values))], **quiet)
+        for each in (effect, Told("knee", effect))
+    ]
+    np.testing.assert_allclose(runs[0].motion.theta, runs[1].motion.theta, atol=1e-11)
+    np.testing.assert_allclose(runs[0].tau_spring, runs[1].tau_spring, atol=1e-8)
