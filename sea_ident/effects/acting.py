@@ -45,6 +45,43 @@ class Action(Protocol):
         """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
 
 
+@dataclass(eq=False, slots=True)
+class JointState:
+    """States of one joint at one instant of a simulation, which may differ in speed.
+
+    Attributes:
+        time: as in `SimulationState` [s].
+        q: (N,) link position.
+        dq: (N,) link velocity.
+        theta: (N,) motor position after the gear.
+        dtheta: (N,) motor velocity after the gear.
+        tau_spring: (N,) torque from the motor side onto the link [N m].
+        tau_motor: (N,) commanded motor torque at the joint side [N m].
+    """
+
+    time: float
+    q: FloatArray
+    dq: FloatArray
+    theta: FloatArray
+    dtheta: FloatArray
+    tau_spring: FloatArray
+    tau_motor: FloatArray
+
+    @staticmethod
+    def of(state: SimulationState, index: int) -> "JointState":
+        """The state (1,) of one joint of a robot."""
+        i = slice(index, index + 1)
+        return JointState(
+            state.time,
+            state.q[i],
+            state.dq[i],
+            state.theta[i],
+            state.dtheta[i],
+            state.tau_spring[i],
+            state.tau_motor[i],
+        )
+
+
 class JointAction(ABC):
     """An action at a single joint that depends on the time and the state of that joint and on nothing else.
 
@@ -60,12 +97,11 @@ class JointAction(ABC):
         self.index, self.on_link, self.on_motor = index, on_link, on_motor
 
     @abstractmethod
-    def amounts(self, time: float, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """(N,) torques [N m] at a time [s], in the states (N,) of the joint."""
+    def amounts(self, state: JointState) -> FloatArray:
+        """(N,) torques [N m] in the states of the joint."""
 
     def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
         """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
-        one = slice(self.index, self.index + 1)
-        amount = self.amounts(state.time, state.q[one], state.dq[one], state.theta[one], state.dtheta[one])[0]
+        amount = self.amounts(JointState.of(state, self.index))[0]
         link[self.index] += self.on_link * amount
         motor[self.index] += self.on_motor * amount

@@ -91,5 +91,5 @@ class Backlash(SpringEffect):
         w, spread = self.half_width, self.softness * self.half_width
         beyond = np.abs(np.array([deflection + w, deflection - w])) * (-2.0 / spread)
         low, high = np.log1p(np.exp(beyond, out=beyond), out=beyond)
-        within: FloatArray = np.minimum(np.maximum(deflection, -w), w)
-        return within + 0.5 * spread * (low - high)
+        within = np.minimum(np.maximum(deflection, -w), w)
+        return np.asarray(within + 0.5 * spread * (low - high), dtype=np.float64)

@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction
+from sea_ident.effects.acting import Action, JointAction, JointState
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -396,10 +396,10 @@ class ColumnsAction(JointAction):
         super().__init__(robot.index(effect.required_joint), *effect.side.shares)
         self._columns, self._values, self._change = effect.local_columns, np.asarray(values, dtype=np.float64), change
 
-    def amounts(self, time: float, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+    def amounts(self, state: JointState) -> FloatArray:
         """(N,) columns times values."""
-        amounts: FloatArray = self._columns(q, dq, theta, dtheta).dot(self._values)
-        return amounts if self._change is None else amounts * self._change(time)
+        amounts: FloatArray = self._columns(state.q, state.dq, state.theta, state.dtheta).dot(self._values)
+        return amounts if self._change is None else amounts * self._change(state.time)
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction, SimulationState
+from sea_ident.effects.acting import Action, JointAction, JointState, SimulationState
 from sea_ident.effects.base import JointEffect
 from sea_ident.effects.signal import is_closed
 from sea_ident.robot import Robot
@@ -101,15 +101,15 @@ class MemoryAction(JointAction):
             self._position = position
         return self._effect.advance(self._memory, position - self._position)
 
-    def amounts(self, time: float, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+    def amounts(self, state: JointState) -> FloatArray:
         """(N,) torques at a position of the joint, of a trial state."""
-        memory = np.array([self._at(position) for position in self._effect.path(q, theta).tolist()])
-        amounts: FloatArray = self._effect.remembered_columns(memory, dtheta).dot(self._values)
+        memory = np.array([self._at(position) for position in self._effect.path(state.q, state.theta).tolist()])
+        amounts: FloatArray = self._effect.remembered_columns(memory, state.dtheta).dot(self._values)
         return amounts
 
     def accept(self, state: SimulationState) -> None:
         """Move the memory on to a state that is kept."""
-        i = self.index
-        position = float(self._effect.path(state.q[i : i + 1], state.theta[i : i + 1])[0])
+        at_joint = JointState.of(state, self.index)
+        position = float(self._effect.path(at_joint.q, at_joint.theta)[0])
         self._memory = self._at(position)
         self._position = position

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.acting import Action, JointAction, JointState
 from sea_ident.effects.base import Column, Contribution, Shape, Side, State
 from sea_ident.effects.drift import TrendEffect, warming
 from sea_ident.effects.load import LoadEffect
@@ -57,9 +57,17 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The part of the commanded torque that is lost."""
-        i = robot.index(self.at)
+        return _Losing(self, robot, values)
 
-        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            motor[i] += state.tau_motor[i] * float(values[0]) * float(warming(np.array(state.time), self.time_constant))
 
-        return act
+class _Losing(JointAction):
+    """The share of the present command that is lost by now."""
+
+    def __init__(self, effect: TorqueConstantDrift, robot: Robot, values: FloatArray) -> None:
+        super().__init__(robot.index(effect.at), *effect.side.shares)
+        self._rate, self._time_constant = float(values[0]), effect.time_constant
+
+    def amounts(self, state: JointState) -> FloatArray:
+        """(N,) commands times the drift."""
+        lost: FloatArray = state.tau_motor * (self._rate * float(warming(np.array(state.time), self._time_constant)))
+        return lost

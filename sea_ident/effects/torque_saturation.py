@@ -1,13 +1,12 @@
 """Torque that falls behind the current when the motor is overloaded."""
 
-import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, SimulationState
+from sea_ident.effects.acting import Action, JointAction, JointState
 from sea_ident.effects.base import Anchor, Column, Contribution, Shape, Side, State
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
@@ -83,10 +82,17 @@ class TorqueSaturation(LoadEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The power of the commanded torque."""
-        i, p = robot.index(self.at), self.exponent
+        return _Saturating(self, robot, values)
 
-        def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            command = float(state.tau_motor[i])
-            motor[i] += float(values[0]) * math.copysign(abs(command) ** p, command)
 
-        return act
+class _Saturating(JointAction):
+    """What saturation takes away at the present command."""
+
+    def __init__(self, effect: TorqueSaturation, robot: Robot, values: FloatArray) -> None:
+        super().__init__(robot.index(effect.at), *effect.side.shares)
+        self._coefficient, self._exponent = float(values[0]), effect.exponent
+
+    def amounts(self, state: JointState) -> FloatArray:
+        """(N,) powers of the commands."""
+        amounts: FloatArray = self._coefficient * np.sign(state.tau_motor) * np.abs(state.tau_motor) ** self._exponent
+        return amounts

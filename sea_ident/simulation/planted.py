@@ -6,7 +6,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, Side, SimulationState
-from sea_ident.effects.acting import Action, JointAction
+from sea_ident.effects.acting import Action, JointAction, JointState
 from sea_ident.effects.load import LoadEffect
 from sea_ident.exceptions import SimulationError
 from sea_ident.robot import Robot
@@ -107,9 +107,9 @@ class PlantedTorques:
         out: list[float],
     ) -> None:
         """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
-        counted = max(time, self._begin)
+        counted, position, velocity = max(time, self._begin), u.tolist(), w.tolist()
         for at in self._joint_springs:
-            tau_spring[at.i] -= at.action.on_link * at.add(counted, u, w, out)
+            tau_spring[at.i] -= at.action.on_link * at.add(counted, position, velocity, tau_motor, tau_spring, out)
         if self._springs or self._others:
             self._set(time, elapsed, u, w, tau_motor, tau_spring)
             for i, torque in enumerate(self._act()):
@@ -117,7 +117,7 @@ class PlantedTorques:
             if self._springs:
                 tau_spring[:] = self._state.tau_spring.tolist()
         for at in self._joint_others:
-            at.add(counted, u, w, out)
+            at.add(counted, position, velocity, tau_motor, tau_spring, out)
 
     def add_damping(
         self,
@@ -130,9 +130,9 @@ class PlantedTorques:
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
         slopes = [0.0] * self._size
-        counted = max(time, self._begin)
+        counted, position, velocity = max(time, self._begin), u.tolist(), w.tolist()
         for at in (*self._joint_springs, *self._joint_others):
-            at.add_slopes(counted, u, w, slopes)
+            at.add_slopes(counted, position, velocity, tau_motor, tau_spring, slopes)
         if self._springs or self._others:
             n = len(self._link)
             self._set(time, 0.0, u, w, tau_motor, tau_spring)
@@ -161,38 +161,60 @@ class PlantedTorques:
 class _AtJoint:
     """What acts at joint i alone, whose motor has the coordinate m."""
 
-    __slots__ = ("_speeds", "action", "i", "m")
+    __slots__ = ("_moved", "_state", "action", "i", "m")
 
     def __init__(self, action: JointAction, m: int) -> None:
         self.action, self.i, self.m = action, action.index, m
-        # The present speeds, that of one side moved, that of the other: both move where there is no spring.
-        self._speeds = [np.zeros(2 if m == self.i else 3) for _ in range(2)]
+        # The state, and the state beside one with the speed of one side moved, of the other: without a spring of both.
+        self._state, self._moved = (
+            JointState(0.0, *(np.zeros(count) for _ in range(6))) for count in (1, 2 if m == self.i else 3)
+        )
 
-    def add(self, time: float, u: FloatArray, w: FloatArray, out: list[float]) -> float:
+    def add(
+        self,
+        time: float,
+        position: list[float],
+        velocity: list[float],
+        tau_motor: list[float],
+        tau_spring: list[float],
+        out: list[float],
+    ) -> float:
         """Subtract the torque from the forces `out`, and return it."""
-        i, m, action = self.i, self.m, self.action
-        q, theta = slice(i, i + 1), slice(m, m + 1)
-        amount = float(action.amounts(time, u[q], w[q], u[theta], w[theta])[0])
+        i, m, action, state = self.i, self.m, self.action, self._state
+        state.time = time
+        state.q[0], state.theta[0] = position[i], position[m]
+        state.dq[0], state.dtheta[0] = velocity[i], velocity[m]
+        state.tau_spring[0], state.tau_motor[0] = tau_spring[i], tau_motor[i]
+        amount = float(action.amounts(state)[0])
         out[i] -= action.on_link * amount
         out[m] -= action.on_motor * amount
         return amount
 
-    def add_slopes(self, time: float, u: FloatArray, w: FloatArray, slopes: list[float]) -> None:
+    def add_slopes(
+        self,
+        time: float,
+        position: list[float],
+        velocity: list[float],
+        tau_motor: list[float],
+        tau_spring: list[float],
+        slopes: list[float],
+    ) -> None:
         """Add the slopes over the speeds of both sides."""
-        i, m, action = self.i, self.m, self.action
-        dq, dtheta = self._speeds
-        dq[:], dtheta[:] = w[i], w[m]
-        link, motor = (SMALL_SPEED if speed[0] >= 0.0 else -SMALL_SPEED for speed in (dq, dtheta))
-        dq[1] += link
-        dtheta[-1] += motor
-        positions = [np.full(len(dq), u[k]) for k in (i, m)]
-        changed = action.amounts(time, positions[0], dq, positions[1], dtheta)
-        change = (changed[1:] - changed[0]).tolist()
+        i, m, action, state = self.i, self.m, self.action, self._moved
+        state.time = time
+        state.q[:], state.theta[:] = position[i], position[m]
+        state.dq[:], state.dtheta[:] = velocity[i], velocity[m]
+        state.tau_spring[:], state.tau_motor[:] = tau_spring[i], tau_motor[i]
+        on_link, on_motor = (SMALL_SPEED if velocity[k] >= 0.0 else -SMALL_SPEED for k in (i, m))
+        state.dq[1] += on_link
+        state.dtheta[-1] += on_motor
+        amounts = action.amounts(state)
+        change = (amounts[1:] - amounts[0]).tolist()
         if m == i:
-            slopes[i] += (action.on_link + action.on_motor) * change[0] / link
+            slopes[i] += (action.on_link + action.on_motor) * change[0] / on_link
         else:
-            slopes[i] += action.on_link * change[0] / link
-            slopes[m] += action.on_motor * change[1] / motor
+            slopes[i] += action.on_link * change[0] / on_link
+            slopes[m] += action.on_motor * change[1] / on_motor
 
 
 def _by_kind(hooks: Sequence[Action], coordinates: Sequence[int]) -> tuple[list[_AtJoint], list[Action]]:

@@ -39,30 +39,23 @@ def offset(laboratory):
     ],
 )
 def test_another_constant_in_another_motion_is_none(laboratory, offset, there, name):
+    """And that the other motion told it is said, for it is then no test of it any more."""
     bench, selection = offset
     recording = laboratory.record([("spring_offset", JOINT, [there], {})], periods=8, seed=9, motion=1)
-    held = tried(Bench(laboratory.data(recording), bench.effects), selection, "another motion")
+    confirmed = Confirmed(selection, bench, selection.start, selection.final)
     position = len(selection.start.fit.effects)
-    found, left, held = decide(bench, selection, {position: ()}, held)
+    now, left, held, notes = _tested(bench, confirmed, {position: ()}, TrendTest(1.0, (), False), recording)
+    found = now.selection
     assert [effect.name for effect in found.effects] == [name]
     assert left[position] == ()
     assert held.transfers[0].holds
     assert held.transfers[0].remembers == (name == "spring_hysteresis")
+    assert [note for note in notes if "third" in note and JOINT in note] == list(notes)
+    assert bool(notes) == (name == "spring_hysteresis")
     if name == "spring_hysteresis":
         # it never slips on the motion that was used
         travel = bench.data.motion.deflection[:, bench.robot.index(JOINT)]
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
-
-
-@pytest.mark.parametrize(("there", "told"), [pytest.param(HERE, False, marks=pytest.mark.slow), (0.4 * HERE, True)])
-def test_that_it_was_told_by_what_was_held_out_is_said(laboratory, offset, there, told):
-    bench, selection = offset
-    recording = laboratory.record([("spring_offset", JOINT, [there], {})], periods=8, seed=9, motion=1)
-    confirmed = Confirmed(selection, bench, selection.start, selection.final)
-    listed = {len(selection.start.fit.effects): ()}
-    _, _, _, notes = _tested(bench, confirmed, listed, TrendTest(1.0, (), False), recording)
-    assert [note for note in notes if "third" in note and JOINT in note] == list(notes)
-    assert bool(notes) == told
 
 
 @pytest.mark.parametrize("amounts", [pytest.param([1.0, 3.0], marks=pytest.mark.slow), [2.0, 1.0]])

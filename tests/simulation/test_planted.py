@@ -202,12 +202,24 @@ def test_slopes_of_a_rigid_joint_are_at_its_only_coordinate():
 
 @pytest.mark.parametrize(
     ("name", "values"),
-    [("torque_ripple", [2.0, -1.0]), ("asymmetric_spring", [40.0]), ("friction_drift", [0.5, 1.0])],
+    [
+        ("torque_ripple", [2.0, -1.0]),
+        ("asymmetric_spring", [40.0]),
+        ("friction_drift", [0.5, 1.0]),
+        ("load_dependent_friction", [0.1]),
+    ],
 )
-def test_it_is_the_same_whether_asked_for_by_joint_or_with_the_whole_robot(leg, leg_series, quiet, name, values):
+def test_it_is_the_same_whether_asked_for_by_joint_or_with_the_whole_robot(leg, leg_series, quiet, exact, name, values):
     effect = make_effect(name, "knee")
     runs = [
-        simulate(leg, leg_series, periods=1, effects=[PlantedEffect(each, np.array(values))], **quiet)
+        simulate(
+            leg,
+            leg_series,
+            periods=1,
+            effects=[PlantedEffect(each, np.array(values))],
+            start=exact.motion,
+            **quiet,
+        )
         for each in (effect, Told("knee", effect))
     ]
     np.testing.assert_allclose(runs[0].motion.theta, runs[1].motion.theta, atol=1e-11)
