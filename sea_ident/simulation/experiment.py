@@ -25,28 +25,18 @@ from sea_ident.simulation.result import Simulation
 from sea_ident.simulation.rosenbrock import ros34pw2
 from sea_ident.simulation.sensors import SensorNoise, WarmUp, sensed_columns
 
-FORESEEN = 100.0
-"""Changes of so many tolerances are foreseen: even if they did not shrink any more, no sensor would show them [-]."""
-
 
 @dataclass(frozen=True)
 class Settling:
     """When the motion counts as periodic.
 
-    The changes from one period to the next shrink by about the same factor each time: where they are `FORESEEN` times
-    the tolerance or less, the next one is foreseen from the last two.
-
     Attributes:
-        tolerance: largest change of a position over the first period of the recording [rad] or [m].
+        tolerance: largest change of a position from one period to the next [rad] or [m].
         longest: periods after which the recording starts in any case, with a warning.
     """
 
     tolerance: float = 1e-8
     longest: int = 10
-
-    def coming(self, change: float, before: float) -> float:
-        """The change that the next period brings, from those of the last two; at most the last."""
-        return change * min(change / before, 1.0) if before > 0.0 and change <= FORESEEN * self.tolerance else change
 
 
 @one_thread
@@ -145,12 +135,11 @@ def simulate(
     warnings = list(plant.notes)
     settled, settling_periods = float("nan"), 0
     if follow.period is not None and start is None:
-        rule, settled, change = settling or Settling(), float("inf"), 0.0
+        rule, settled = settling or Settling(), float("inf")
         while settled > rule.tolerance and settling_periods < rule.longest:
             before, state = state, passes.settle(state)
             settling_periods += 1
-            last, change = change, float(np.max(np.abs(state - before)[: system.size]))
-            settled = rule.coming(change, last)
+            settled = float(np.max(np.abs(state - before)[: system.size]))
         if settled > rule.tolerance:
             warnings.append(
                 f"after {settling_periods} settling periods the motion still changes by {settled:.2g} (rad or m) from "

@@ -25,7 +25,7 @@ class Simulation:
         period: [s], None where the reference does not repeat.
         periods: number of recorded periods, 1 where the reference does not repeat.
         settling_periods: periods that were simulated before the recording.
-        settled: largest change of a position that is left after settling [rad] or [m]; NaN without settling.
+        settled: largest change of a position over the last settling period [rad] or [m]; NaN without settling.
         step: step of the integrator [s].
         steps: number of steps, settling included.
         warnings: what a user should know.
@@ -54,7 +54,7 @@ class Simulation:
             if self.period is not None
             else f"simulation of {robot.name}: one pass of {float(self.motion.time[-1]):g} s",
             f"  step {1e3 * self.step:g} ms, {self.steps} steps, {self.settling_periods} settling periods, "
-            f"change left {self.settled:.2g}",
+            f"last change {self.settled:.2g}",
         ]
         error = self.motion.theta - self.reference.theta
         for i, joint in enumerate(robot.joints):

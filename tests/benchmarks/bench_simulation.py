@@ -84,7 +84,7 @@ def settling_table() -> None:
     print("\nsettling to 1e-8")
     for name, robot in (("exo_leg", load_robot("exo_leg")), ("Baxter arm", baxter_arm()), ("UR10", ur10())):
         run = simulate(robot, modest_series(robot, base_frequency=0.1, harmonics=6), periods=1)
-        print(f"  {name:12s}{run.settling_periods} periods, change left {run.settled:.1e}")
+        print(f"  {name:12s}{run.settling_periods} periods, last change {run.settled:.1e}")
 
 
 if __name__ == "__main__":

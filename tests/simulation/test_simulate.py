@@ -30,25 +30,6 @@ def test_settled_motion_repeats(exact):
     assert exact.motion.time[samples] == pytest.approx(exact.period)
 
 
-@pytest.mark.parametrize(
-    ("change", "before", "coming"),
-    [
-        (1e-7, 1e-5, 1e-9),  # shrinks by the same factor
-        (1e-7, 1e-8, 1e-7),  # grows: nothing better is to be expected
-        (1e-5, 1e-2, 1e-5),  # too much to rely on it
-        (1e-9, 0.0, 1e-9),  # nothing to compare with
-    ],
-)
-def test_the_change_of_the_next_period_is_foreseen_where_the_last_is_small(change, before, coming):
-    assert Settling(1e-8).coming(change, before) == pytest.approx(coming)
-
-
-def test_what_was_foreseen_comes(leg, leg_series, quiet, exact):
-    often = simulate(leg, leg_series, periods=1, settling=Settling(tolerance=1e-12), **quiet)
-    assert often.settling_periods > exact.settling_periods
-    np.testing.assert_allclose(exact.motion.q[: len(often.motion)], often.motion.q, atol=1e-8)
-
-
 def test_unsettled_motion_is_said(leg, leg_series, quiet):
     run = simulate(leg, leg_series, periods=1, settling=Settling(tolerance=1e-30, longest=2), **quiet)
     assert run.settling_periods == 2
