@@ -91,8 +91,8 @@ def test_what_holds_there_as_well_stays_possible(rivals):
 def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_turned_out_to_be(laboratory):
     """Both effects are named wrongly, and both alternatives are right: neither is judged beside the other's error."""
     planted = [("spring_offset", JOINT, [0.5], {}), ("load_dependent_friction", "hip", [0.1], {})]
-    bench = laboratory.bench(laboratory.record(planted, periods=12))
-    other = Bench(laboratory.data(laboratory.record(planted, periods=8, seed=9, motion=1)), bench.effects)
+    bench = laboratory.bench(laboratory.record(planted, periods=6))
+    other = Bench(laboratory.data(laboratory.record(planted, periods=5, seed=9, motion=1)), bench.effects)
     start = settle(bench, bench.effects)
     found = {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
     wrong = found["asymmetric_spring", JOINT], found["nonlinear_viscous_friction", "hip"]

@@ -236,7 +236,8 @@ def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(la
     planted = [("external_force", "ankle", [0.0, 0.0, 0.4], {"start": 0.4, "stop": 0.9})]
 
     def kept(amplitude, known):
-        recording = laboratory.record([*planted, ("torque_ripple", "hip", [amplitude, 0.0], {"order": 4.0})])
+        ripples = ("torque_ripple", "hip", [amplitude, 0.0], {"order": 4.0})
+        recording = laboratory.record([*planted, ripples], periods=5)
         bench = laboratory.bench(recording)
         start = settle(bench, (*bench.effects, *known))
         now = settle(bench, (*bench.effects, *known, push))
