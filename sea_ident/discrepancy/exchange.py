@@ -1,7 +1,8 @@
 """Effects that were added, replaced by better ones now that the others are there."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import TypeAlias
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan, sought
@@ -25,10 +26,7 @@ OUTDONE = 0.5
 """One that explains less than this share of what the effect does is not tried in its place again [-], ..."""
 
 PROMISES_MORE = 0.1
-"""... unless it promises more of that than it did, by this share of it [-], ..."""
-
-MAKES_UP = 3.0
-"""... nor one that fell short by more than this many times what was explained since [-]."""
+"""... unless it promises more of that than it did, by this share of it [-]."""
 
 
 @dataclass(frozen=True)
@@ -38,42 +36,18 @@ class Outdone:
     Attributes:
         promised: share of what the other explains that it promised to explain [-].
         explained: share that it did, nothing where it cannot be [-].
-        short: statistic that it left beyond that of the other.
-        left: statistic that the other left.
     """
 
     promised: float
     explained: float
-    short: float
-    left: float
 
-    def again(self, promised: float, left: float) -> bool:
-        """Whether it is worth another try by what it promises now [-], and by the statistic that the other leaves."""
-        if promised > self.promised + PROMISES_MORE:
-            return True
-        return self.explained > OUTDONE and not 0.0 <= MAKES_UP * (self.left - left) < self.short
+    def again(self, promised: float) -> bool:
+        """Whether it is worth another try by what it promises now [-]."""
+        return promised > self.promised + PROMISES_MORE or self.explained > OUTDONE
 
 
-@dataclass(frozen=True)
-class Tried:
-    """What was tried in the place of effects that were added; it grows as more is.
-
-    Attributes:
-        outdone: what did not take the place, by the effect and what was tried.
-        looked: statistic that was left, and what of it the effect explained, when all others were last held against it.
-    """
-
-    outdone: dict[tuple[Key, Key], Outdone] = field(default_factory=dict)
-    looked: dict[Key, tuple[float, float]] = field(default_factory=dict)
-
-    def nothing_new(self, own: Key, left: float) -> bool:
-        """Whether too little was explained since for any other effect to be worth a try in the place of one."""
-        if own not in self.looked:
-            return False
-        before, explained = self.looked[own]
-        if not 0.0 <= before - left < PROMISES_MORE * explained:
-            return False
-        return not any(last.again(last.promised, left) for (of, _), last in self.outdone.items() if of == own)
+Tried: TypeAlias = dict[tuple[Key, Key], Outdone]
+"""What did not take the place of an effect that was added, by the effect and what was tried; it grows as more is."""
 
 
 def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key] = ()) -> Settled:
@@ -95,20 +69,17 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
         if fit.statistic < RIGHT * fit.dof and not slowest(fit.effects[position]):
             continue
         own = effect_key(fit.effects[position])
-        if tried.nothing_new(own, fit.statistic):
-            continue
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         explained = max(reduced.statistic - fit.statistic, 1e-300)
-        tried.looked[own] = fit.statistic, explained
         best, scanned = fit, scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
         rivals = [c for c in scanned if c.key != own and c.key not in ruled_out]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
             promised = candidate.gain / explained
-            last = tried.outdone.get((own, candidate.key))
+            last = tried.get((own, candidate.key))
             if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
                 continue
-            if last is not None and not last.again(promised, fit.statistic):
+            if last is not None and not last.again(promised):
                 continue
             better = best.statistic + fit.unit * (penalty(best.effects[position], bench) - 1.0)
             beat = better - fit.unit * penalty(candidate.effect, bench)
@@ -116,7 +87,7 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
             slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
             possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
             gain = reduced.statistic - new.statistic if possible else 0.0
-            tried.outdone[own, candidate.key] = Outdone(promised, gain / explained, explained - gain, fit.statistic)
+            tried[own, candidate.key] = Outdone(promised, gain / explained)
             if possible and new.statistic + fit.unit * penalty(new.effects[position], bench) < better:
                 best = new
         if best is not fit:

@@ -155,7 +155,7 @@ def search(
     start = settle(bench, effects) if start is None else start
     now, added = start, list[float]()
     largest = np.zeros(len(bench.data.equations))
-    tried = Tried()
+    tried: Tried = {}
     if begun is not None and begun.added:
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
@@ -276,8 +276,7 @@ def next_effect(
     own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
     if tried is not None:
         for candidate, gain in refits:
-            shares = candidate.gain / whole_gain, gain / whole_gain
-            tried.outdone[own, candidate.key] = Outdone(*shares, whole_gain - gain, best.statistic)
+            tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
     return best, best_p
 
 

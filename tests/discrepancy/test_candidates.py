@@ -10,7 +10,9 @@ from sea_ident.discrepancy import candidates, periods
 from sea_ident.discrepancy.candidates import FEW_SHAPES, candidate_effects, scan
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import Side, make_effect
+from sea_ident.motion import FourierSeries
 
 OFFSETS = (0.0123, 0.012341)
 
@@ -106,3 +108,18 @@ def test_inner_products_are_those_of_the_columns_of_each_shape(width):
     for v in range(4):
         own = columns[:, v * width : (v + 1) * width]
         np.testing.assert_allclose(found[v], own.T @ own)
+
+
+def test_play_that_is_never_closed_does_what_an_offset_does(laboratory):
+    """The spring is bent to one side, by little more than the motion bends it: to tell the two takes all digits."""
+    wide = laboratory.motions[0]
+    narrow = FourierSeries(wide.base_frequency, wide.offset, 0.25 * wide.a, 0.25 * wide.b)
+    few = replace(laboratory, motions=(narrow,))
+    bench = few.bench(few.record([("spring_offset", "hip", [-3.0], {})], periods=4))
+    deflection = bench.data.motion.deflection[:, 0]
+    assert 0.0 < deflection.min() < deflection.max() < 1.5 * deflection.min()
+    now = settle(bench, bench.effects)
+    effects = [make_effect(name, "hip") for name in ("spring_offset", "backlash")]
+    gains = {c.effect.name: c.gain for c in scan(bench, now.fit, now.noise, effects)}
+    assert gains["spring_offset"] > 100.0
+    assert gains["backlash"] == pytest.approx(gains["spring_offset"], rel=0.02)

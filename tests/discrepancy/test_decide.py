@@ -11,7 +11,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.decide import _better, decide, simplest_first
 from sea_ident.discrepancy.diagnose import _searched_beside, _tested
-from sea_ident.discrepancy.exchange import Tried, exchange
+from sea_ident.discrepancy.exchange import exchange
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import Kind, tried
 from sea_ident.discrepancy.judge import penalty
@@ -151,14 +151,14 @@ def test_nor_in_an_exchange(constant_or_wave):
     bench, start, _, wave = constant_or_wave
     everything = {c.key for c in scan(bench, start.fit, start.noise)}
     ruled_out = everything - {("torque_offset", JOINT, "")}
-    after = exchange(bench, Settled(wave, start.noise), 1, Tried(), ruled_out)
+    after = exchange(bench, Settled(wave, start.noise), 1, {}, ruled_out)
     assert after.fit.effects[-1].name == "torque_offset"
 
 
 def test_what_is_ruled_out_takes_the_place_of_nothing(constant_or_wave):
     bench, start, _, wave = constant_or_wave
     now = Settled(wave, start.noise)
-    assert exchange(bench, now, 1, Tried(), {c.key for c in scan(bench, start.fit, start.noise)}) is now
+    assert exchange(bench, now, 1, {}, {c.key for c in scan(bench, start.fit, start.noise)}) is now
 
 
 def test_what_is_in_the_model_is_no_alternative_to_another_part_of_it(rivals):

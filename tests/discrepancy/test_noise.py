@@ -20,6 +20,10 @@ from sea_ident.discrepancy.noise import (
     unstacked,
 )
 from sea_ident.discrepancy.settle import settle
+from sea_ident.effects import make_effect
+from sea_ident.effects.base import Effect
+from sea_ident.effects.torque_delay import TorqueDelay
+from sea_ident.simulation import plant_from_robot
 
 HARMONICS = 150
 DRAWS = 400
@@ -242,3 +246,19 @@ def test_a_model_that_is_wrong_by_a_twentieth_of_the_torque_is_seen(rippled):
     assert bench.statistic(with_it.fit, wrong_scale) == pytest.approx(
         4.0 * bench.statistic(with_it.fit, start.noise), rel=1e-6
     )
+
+
+def test_what_a_late_torque_leaves_beside_its_jump_is_no_lack_of_the_model(laboratory, monkeypatch):
+    """Friction jumps in the record when the recorded torque acts, not when the motor turns."""
+    plant = plant_from_robot(laboratory.leg)
+    plant = plant.replace(coulomb_friction=4.0 * plant.coulomb_friction)
+    late = make_effect("torque_delay", "hip", delay=0.02)
+    recording = laboratory.record([(late, [])], periods=6, plant=plant)
+    fits = []
+    for turning in (TorqueDelay.turning, Effect.turning):
+        monkeypatch.setattr(TorqueDelay, "turning", turning)
+        bench = laboratory.bench(recording)
+        fits.append(settle(bench, (*bench.effects, late)).fit)
+    own, other = fits
+    assert own.statistic / own.dof < other.statistic / other.dof - 0.05
+    assert own.effects[-1].delay == pytest.approx(0.02, abs=1e-4)
