@@ -98,7 +98,7 @@ def raise_inside(
                 damping *= 10.0
         assert placed is not None
         gain, value = found - value, found
-        if predicted > 0.0 and np.isfinite(gain):  # it is not from where a parameter does not show at all
+        if predicted > 0.0 and np.isfinite(gain):  # infinite where a parameter did not show before the step
             # of the parabola that begins with the slope of the model and ends with the true gain; rounded, as the last
             # digits of a gain would lead the ascent into another optimum
             stiffer = float(np.clip(round((2.0 - gain / predicted) / _GRAIN) * _GRAIN, *_STIFFER))
