@@ -176,8 +176,8 @@ for label, effects in candidates.items():
     print(f"{label:<8}" + "".join(f"{cell:>24}" for cell in cells) + f"{error:>16.2e} N m")
 
 # %% [markdown]
-# Then as it would be measured. The planar model's rotor inertias are off by two to three of the standard deviations
-# that it claims, by more with more periods, and it predicts the torque of another trajectory worse.
+# Then as it would be measured. The planar model's inertia of the small rotors is off by about three of the standard
+# deviations that it claims, by more with more periods, and it predicts the torque of another trajectory worse.
 
 # %%
 models, errors = {}, {}
