@@ -150,14 +150,14 @@ if path:
 # %% [markdown]
 # Three things to take from this.
 #
-# - The two terms that were left out are named, and the repaired model is the one we identified above: the residual is the
-#   same to a fifth of a percent, the values are well within their intervals. But note the small print: on a horizontal
-#   axis a constant force is the same column as a tilt of the base (0.2 degrees would do). The data cannot choose, so the
-#   software says so instead of choosing.
+# - The two terms that were left out are named, and the repaired model is the one we identified above: the residual is
+#   the same to a fifth of a percent, the values are well within their intervals. But note the small print: on a
+#   horizontal axis a constant force is the same column as a tilt of the base (0.2 degrees would do). The data cannot
+#   choose, so the software says so instead of choosing.
 # - Beyond the published model something is still missing: the scatter between the three periods is some 0.1 N, and the
-#   model leaves more than ten times as much. A published reference model is not a perfect one. The second round says how
-#   much is left, 3 % of the force, and no more: from three periods it cannot be told how they scatter along what a finer
-#   effect does, so none is looked for. Nothing is added, and the history stops here.
+#   model leaves more than ten times as much. A published reference model is not a perfect one. The second round says
+#   how much is left, 3 % of the force, and no more: from three periods it cannot be told how they scatter along what a
+#   finer effect does, so none is looked for. Nothing is added, and the history stops here.
 # - Three periods are few. Each verdict says so.
 #
 # ### Who pushed the carriage?
