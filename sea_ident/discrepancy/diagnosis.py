@@ -75,7 +75,7 @@ class Diagnosis:
         for m in self.missing:
             where = f" at {m.joint}" if m.joint else ""
             lines.append(f"  {kind}: {m.effect}{where}, {m.extent}, p {chance(m.p_value)}")
-            lines.extend(f"    {p.name} {p.value:.4g} +- {p.std:.2g} {p.unit}" for p in m.parameters)
+            lines.extend(f"    {p}" for p in m.parameters)
             if m.alternatives:
                 others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)
                 lines.append(f"    or: {others}")

@@ -85,7 +85,7 @@ class MissingParameter:
     Attributes:
         name: name.
         value: value.
-        std: standard deviation.
+        std: standard deviation; 0 of what was held, as the time constant of a drift that goes straight on.
         unit: unit.
     """
 
@@ -93,6 +93,12 @@ class MissingParameter:
     value: float
     std: float
     unit: str
+
+    def __str__(self) -> str:
+        """Name, value with its standard deviation or that it was held, unit."""
+        value = f"{self.value:.4g}"
+        sure = f"{value} +- {self.std:.2g} {self.unit}" if self.std else f"{value} {self.unit}, held"
+        return f"{self.name} {sure}"
 
 
 @dataclass(frozen=True)

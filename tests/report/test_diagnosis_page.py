@@ -124,6 +124,17 @@ def test_the_page_says_verdict_gap_effect_and_alternatives(diagnosis, tmp_path):
     assert "0.1 % of the torque: an unmodelled remainder" in text
 
 
+def test_what_was_held_has_no_standard_deviation(diagnosis, tmp_path):
+    (found,) = diagnosis.missing
+    size, speed = found.parameters
+    found = replace(found, parameters=(size, replace(speed, std=0.0)))
+    diagnosis = replace(diagnosis, missing=(found,))
+    assert "knee.stribeck_friction_speed 0.3 held rad/s" in words(page_of(diagnosis, tmp_path))
+    lines = [line.strip() for line in diagnosis.summary().splitlines()]
+    assert "knee.stribeck_friction 0.6 +- 0.02 N m" in lines
+    assert "knee.stribeck_friction_speed 0.3 rad/s, held" in lines
+
+
 def test_a_diagnosis_read_from_its_file_gives_the_same_page(diagnosis, tmp_path):
     diagnosis.save(tmp_path / "d.json")
     again = read_diagnosis(tmp_path / "d.json")
