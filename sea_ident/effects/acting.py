@@ -1,8 +1,10 @@
 """How an effect acts in a simulation."""
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
 
 from sea_ident._typing import FloatArray
 
@@ -32,6 +34,12 @@ class SimulationState:
     tau_motor: FloatArray
     elapsed: float = 0.0
 
+    def at(self, index: int) -> "SimulationState":
+        """The state of one joint alone, with arrays (1,); several states of it at one time have arrays (N,)."""
+        i = slice(index, index + 1)
+        q, dq, theta, dtheta = self.q[i], self.dq[i], self.theta[i], self.dtheta[i]
+        return SimulationState(self.time, q, dq, theta, dtheta, self.tau_spring[i], self.tau_motor[i], self.elapsed)
+
 
 class Action(Protocol):
     """How an effect acts in a simulation.
@@ -45,63 +53,35 @@ class Action(Protocol):
         """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
 
 
-@dataclass(eq=False, slots=True)
-class JointState:
-    """States of one joint at one instant of a simulation, which may differ in speed.
-
-    Attributes:
-        time: as in `SimulationState` [s].
-        q: (N,) link position.
-        dq: (N,) link velocity.
-        theta: (N,) motor position after the gear.
-        dtheta: (N,) motor velocity after the gear.
-        tau_spring: (N,) torque from the motor side onto the link [N m].
-        tau_motor: (N,) commanded motor torque at the joint side [N m].
-    """
-
-    time: float
-    q: FloatArray
-    dq: FloatArray
-    theta: FloatArray
-    dtheta: FloatArray
-    tau_spring: FloatArray
-    tau_motor: FloatArray
-
-    @staticmethod
-    def of(state: SimulationState, index: int) -> "JointState":
-        """The state (1,) of one joint of a robot."""
-        i = slice(index, index + 1)
-        return JointState(
-            state.time,
-            state.q[i],
-            state.dq[i],
-            state.theta[i],
-            state.dtheta[i],
-            state.tau_spring[i],
-            state.tau_motor[i],
-        )
-
-
-class JointAction(ABC):
-    """An action at a single joint that depends on the time and the state of that joint and on nothing else.
+class JointAction:
+    """An action at a single joint: columns that depend on the time and the state of that joint alone, times values.
 
     A simulator asks for it at several speeds at once, and without the state of the rest of the robot.
 
-    Attributes:
+    Args:
         index: of the joint.
-        on_link: share of its torque in the link row, with its sign [-].
-        on_motor: share of its torque in the motor row, with its sign [-].
+        shares: of its torque in the link row and in the motor row, with their signs [-].
+        columns: (N, k) columns from N states of the joint (`SimulationState.at`).
+        values: (k,) values of its parameters.
     """
 
-    def __init__(self, index: int, on_link: float, on_motor: float) -> None:
-        self.index, self.on_link, self.on_motor = index, on_link, on_motor
+    def __init__(
+        self,
+        index: int,
+        shares: tuple[float, float],
+        columns: Callable[[SimulationState], FloatArray],
+        values: FloatArray,
+    ) -> None:
+        self.index, (self.on_link, self.on_motor) = index, shares
+        self._columns, self._values = columns, np.asarray(values, dtype=np.float64)
 
-    @abstractmethod
-    def amounts(self, state: JointState) -> FloatArray:
-        """(N,) torques [N m] in the states of the joint."""
+    def amounts(self, state: SimulationState) -> FloatArray:
+        """(N,) torques [N m] in N states of the joint."""
+        amounts: FloatArray = self._columns(state).dot(self._values)
+        return amounts
 
     def __call__(self, state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
         """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
-        amount = self.amounts(JointState.of(state, self.index))[0]
+        amount = self.amounts(state.at(self.index))[0]
         link[self.index] += self.on_link * amount
         motor[self.index] += self.on_motor * amount

@@ -12,7 +12,7 @@ and their sum is the row of a rigid joint, in which the spring cancels (paper, e
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction, JointState
+from sea_ident.effects.acting import Action, JointAction, SimulationState
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -361,7 +361,11 @@ class JointEffect(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The columns at the present state, times the values."""
-        return ColumnsAction(self, robot, values)
+        return JointAction(robot.index(self.required_joint), self.side.shares, self.present_columns, values)
+
+    def present_columns(self, state: SimulationState) -> FloatArray:
+        """(N, k) columns in N states of the joint at one time of a simulation."""
+        return self.local_columns(state.q, state.dq, state.theta, state.dtheta)
 
     @property
     def required_joint(self) -> str:
@@ -378,28 +382,6 @@ class JointEffect(Effect):
         """Units of torque and of position of its joint: (N m, rad) or (N, m)."""
         joint = robot.joints[robot.index(self.required_joint)]
         return joint.torque_unit, joint.position_unit
-
-
-class ColumnsAction(JointAction):
-    """The columns of a `JointEffect` at the present state, times its values and what changes in time.
-
-    Args:
-        effect: the effect.
-        robot: the robot.
-        values: (k,) values of its parameters.
-        change: factor at a time [s]; one at all times where there is none.
-    """
-
-    def __init__(
-        self, effect: JointEffect, robot: Robot, values: FloatArray, change: Callable[[float], float] | None = None
-    ) -> None:
-        super().__init__(robot.index(effect.required_joint), *effect.side.shares)
-        self._columns, self._values, self._change = effect.local_columns, np.asarray(values, dtype=np.float64), change
-
-    def amounts(self, state: JointState) -> FloatArray:
-        """(N,) columns times values."""
-        amounts: FloatArray = self._columns(state.q, state.dq, state.theta, state.dtheta).dot(self._values)
-        return amounts if self._change is None else amounts * self._change(state.time)
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

@@ -7,9 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
-from sea_ident.effects.base import ColumnsAction, Contribution, JointEffect, Shape, State
-from sea_ident.robot import Robot
+from sea_ident.effects.acting import SimulationState
+from sea_ident.effects.base import Contribution, JointEffect, Shape, State
 
 _MINUTE = 60.0
 
@@ -70,6 +69,6 @@ class DriftEffect(JointEffect, TrendEffect):
         change = warming(state.motion.time, self.time_constant)[:, None, None]
         return Contribution(rows.link * change, rows.motor * change, rows.joint)
 
-    def torque(self, robot: Robot, values: FloatArray) -> Action:
-        """The columns at the present state and time, times the values."""
-        return ColumnsAction(self, robot, values, lambda time: float(warming(np.array(time), self.time_constant)))
+    def present_columns(self, state: SimulationState) -> FloatArray:
+        """Columns times the drift."""
+        return super().present_columns(state) * warming(np.array(state.time), self.time_constant)

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction, JointState
+from sea_ident.effects.acting import Action, JointAction
 from sea_ident.effects.base import Anchor, Contribution, Effect, Side, State, smooth_sign
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -153,23 +153,6 @@ class MotorLoadEffect(LoadEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The same at the present state, with the torque that the simulator has for the joint."""
-        return MotorLoadAction(self, robot, values)
-
-
-class MotorLoadAction(JointAction):
-    """A `MotorLoadEffect` at work in a simulation.
-
-    Args:
-        effect: the effect.
-        robot: the robot.
-        values: (1,) value of its parameter.
-    """
-
-    def __init__(self, effect: MotorLoadEffect, robot: Robot, values: FloatArray) -> None:
-        super().__init__(robot.index(effect.at), *Side.MOTOR.shares)
-        self._column, self._values = effect.column_of, np.asarray(values, dtype=np.float64)
-
-    def amounts(self, state: JointState) -> FloatArray:
-        """(N,) column times the value."""
-        amounts: FloatArray = self._column(state.tau_spring, state.dtheta).dot(self._values)
-        return amounts
+        return JointAction(
+            robot.index(self.at), self.side.shares, lambda state: self.column_of(state.tau_spring, state.dtheta), values
+        )

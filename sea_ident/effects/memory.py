@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction, JointState, SimulationState
+from sea_ident.effects.acting import Action, JointAction, SimulationState
 from sea_ident.effects.base import JointEffect
 from sea_ident.effects.signal import is_closed
 from sea_ident.robot import Robot
@@ -91,8 +91,8 @@ class MemoryAction(JointAction):
     """
 
     def __init__(self, effect: MemoryEffect, robot: Robot, values: FloatArray) -> None:
-        super().__init__(robot.index(effect.required_joint), *effect.side.shares)
-        self._effect, self._values = effect, np.asarray(values, dtype=np.float64)
+        super().__init__(robot.index(effect.required_joint), effect.side.shares, self._remembered, values)
+        self._effect = effect
         self._memory: tuple[float, ...] = (0.0,) * effect.memory_size
         self._position: float | None = None
 
@@ -101,15 +101,14 @@ class MemoryAction(JointAction):
             self._position = position
         return self._effect.advance(self._memory, position - self._position)
 
-    def amounts(self, state: JointState) -> FloatArray:
-        """(N,) torques at a position of the joint, of a trial state."""
+    def _remembered(self, state: SimulationState) -> FloatArray:
+        """(N, k) columns in trial states of the joint."""
         memory = np.array([self._at(position) for position in self._effect.path(state.q, state.theta).tolist()])
-        amounts: FloatArray = self._effect.remembered_columns(memory, state.dtheta).dot(self._values)
-        return amounts
+        return self._effect.remembered_columns(memory, state.dtheta)
 
     def accept(self, state: SimulationState) -> None:
         """Move the memory on to a state that is kept."""
-        at_joint = JointState.of(state, self.index)
-        position = float(self._effect.path(at_joint.q, at_joint.theta)[0])
+        own = state.at(self.index)
+        position = float(self._effect.path(own.q, own.theta)[0])
         self._memory = self._at(position)
         self._position = position

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
-from sea_ident.effects.base import Anchor, Column, ColumnsAction, Contribution, JointEffect, Side, State, smooth_sign
+from sea_ident.effects.acting import SimulationState
+from sea_ident.effects.base import Anchor, Column, Contribution, JointEffect, Side, State, smooth_sign
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -84,9 +84,9 @@ class TemperatureFriction(JointEffect, TrendEffect):
         value: FloatArray = self.reference - self.rise * np.expm1(-time / self.time_constant)
         return value
 
-    def torque(self, robot: Robot, values: FloatArray) -> Action:
-        """With the temperature that rises as `rise` and `time_constant` say."""
-        return ColumnsAction(self, robot, values, lambda time: float(self.temperature(np.array(time))) - self.reference)
+    def present_columns(self, state: SimulationState) -> FloatArray:
+        """Columns times the temperature, which rises as `rise` and `time_constant` say."""
+        return super().present_columns(state) * (self.temperature(np.array(state.time)) - self.reference)
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """A thermometer beside the other sensors."""

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction, JointState
+from sea_ident.effects.acting import Action, JointAction, SimulationState
 from sea_ident.effects.base import Column, Contribution, Shape, Side, State
 from sea_ident.effects.drift import TrendEffect, warming
 from sea_ident.effects.load import LoadEffect
@@ -57,17 +57,8 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The part of the commanded torque that is lost."""
-        return _Losing(self, robot, values)
 
+        def columns(state: SimulationState) -> FloatArray:
+            return (state.tau_motor * warming(np.array(state.time), self.time_constant))[:, None]
 
-class _Losing(JointAction):
-    """The share of the present command that is lost by now."""
-
-    def __init__(self, effect: TorqueConstantDrift, robot: Robot, values: FloatArray) -> None:
-        super().__init__(robot.index(effect.at), *effect.side.shares)
-        self._rate, self._time_constant = float(values[0]), effect.time_constant
-
-    def amounts(self, state: JointState) -> FloatArray:
-        """(N,) commands times the drift."""
-        lost: FloatArray = state.tau_motor * (self._rate * float(warming(np.array(state.time), self._time_constant)))
-        return lost
+        return JointAction(robot.index(self.at), self.side.shares, columns, values)

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action, JointAction, JointState
+from sea_ident.effects.acting import Action, JointAction
 from sea_ident.effects.base import Anchor, Column, Contribution, Shape, Side, State
 from sea_ident.effects.load import LoadEffect
 from sea_ident.robot import Robot
@@ -74,7 +74,11 @@ class TorqueSaturation(LoadEffect):
                 error = command - coefficient * np.sign(command) * size**p - torque
                 slope = np.maximum(1.0 - p * coefficient * size ** (p - 1.0), 0.1)
                 command = np.clip(command - error / slope, -largest, largest)
-        return state.at(self.side, self.at, (np.sign(command) * np.abs(command) ** p)[:, None])
+        return state.at(self.side, self.at, self._power(command))
+
+    def _power(self, command: FloatArray) -> FloatArray:
+        column: FloatArray = (np.sign(command) * np.abs(command) ** self.exponent)[:, None]
+        return column
 
     @staticmethod
     def _typical(torque: FloatArray) -> float:
@@ -82,17 +86,4 @@ class TorqueSaturation(LoadEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The power of the commanded torque."""
-        return _Saturating(self, robot, values)
-
-
-class _Saturating(JointAction):
-    """What saturation takes away at the present command."""
-
-    def __init__(self, effect: TorqueSaturation, robot: Robot, values: FloatArray) -> None:
-        super().__init__(robot.index(effect.at), *effect.side.shares)
-        self._coefficient, self._exponent = float(values[0]), effect.exponent
-
-    def amounts(self, state: JointState) -> FloatArray:
-        """(N,) powers of the commands."""
-        amounts: FloatArray = self._coefficient * np.sign(state.tau_motor) * np.abs(state.tau_motor) ** self._exponent
-        return amounts
+        return JointAction(robot.index(self.at), self.side.shares, lambda state: self._power(state.tau_motor), values)

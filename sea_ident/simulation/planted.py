@@ -1,12 +1,13 @@
 """Planted effects in a running simulation."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, Side, SimulationState
-from sea_ident.effects.acting import Action, JointAction, JointState
+from sea_ident.effects.acting import Action, JointAction
 from sea_ident.effects.load import LoadEffect
 from sea_ident.exceptions import SimulationError
 from sea_ident.robot import Robot
@@ -27,6 +28,22 @@ def motor_coordinates(robot: Robot) -> list[int]:
     for k, i in enumerate(robot.elastic_indices):
         motors[int(i)] = robot.n + k
     return motors
+
+
+class _Instant(NamedTuple):
+    """Time and coordinates (size,) as numbers, torques (n,)."""
+
+    time: float
+    position: list[float]
+    velocity: list[float]
+    tau_motor: list[float]
+    tau_spring: list[float]
+
+
+def _states(count: int) -> SimulationState:
+    """A state of so many joints, or so many states of one: to build one anew would take longer than most effects."""
+    q, dq, theta, dtheta, tau_spring, tau_motor = np.zeros((6, count))
+    return SimulationState(0.0, q, dq, theta, dtheta, tau_spring, tau_motor)
 
 
 class PlantedTorques:
@@ -54,9 +71,7 @@ class PlantedTorques:
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
         self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
         self.idle = not hooks
-        # One state for all calls: to build one would take longer than most effects.
-        zeros = [np.zeros(n) for _ in range(6)]
-        self._state = SimulationState(0.0, zeros[0], zeros[1], zeros[2], zeros[3], zeros[4], zeros[5])
+        self._state = _states(n)
         self._link, self._torque = np.zeros(n), np.zeros(n)
         self._size = n + len(robot.elastic_indices)
 
@@ -107,9 +122,9 @@ class PlantedTorques:
         out: list[float],
     ) -> None:
         """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
-        counted, position, velocity = max(time, self._begin), u.tolist(), w.tolist()
+        instant = _Instant(max(time, self._begin), u.tolist(), w.tolist(), tau_motor, tau_spring)
         for at in self._joint_springs:
-            tau_spring[at.i] -= at.action.on_link * at.add(counted, position, velocity, tau_motor, tau_spring, out)
+            tau_spring[at.i] -= at.action.on_link * at.add(instant, out)
         if self._springs or self._others:
             self._set(time, elapsed, u, w, tau_motor, tau_spring)
             for i, torque in enumerate(self._act()):
@@ -117,7 +132,7 @@ class PlantedTorques:
             if self._springs:
                 tau_spring[:] = self._state.tau_spring.tolist()
         for at in self._joint_others:
-            at.add(counted, position, velocity, tau_motor, tau_spring, out)
+            at.add(instant, out)
 
     def add_damping(
         self,
@@ -130,9 +145,9 @@ class PlantedTorques:
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
         slopes = [0.0] * self._size
-        counted, position, velocity = max(time, self._begin), u.tolist(), w.tolist()
+        instant = _Instant(max(time, self._begin), u.tolist(), w.tolist(), tau_motor, tau_spring)
         for at in (*self._joint_springs, *self._joint_others):
-            at.add_slopes(counted, position, velocity, tau_motor, tau_spring, slopes)
+            at.add_slopes(instant, slopes)
         if self._springs or self._others:
             n = len(self._link)
             self._set(time, 0.0, u, w, tau_motor, tau_spring)
@@ -166,55 +181,37 @@ class _AtJoint:
     def __init__(self, action: JointAction, m: int) -> None:
         self.action, self.i, self.m = action, action.index, m
         # The state, and the state beside one with the speed of one side moved, of the other: without a spring of both.
-        self._state, self._moved = (
-            JointState(0.0, *(np.zeros(count) for _ in range(6))) for count in (1, 2 if m == self.i else 3)
-        )
+        self._state, self._moved = (_states(count) for count in (1, 2 if m == self.i else 3))
 
-    def add(
-        self,
-        time: float,
-        position: list[float],
-        velocity: list[float],
-        tau_motor: list[float],
-        tau_spring: list[float],
-        out: list[float],
-    ) -> float:
-        """Subtract the torque from the forces `out`, and return it."""
-        i, m, action, state = self.i, self.m, self.action, self._state
-        state.time = time
-        state.q[0], state.theta[0] = position[i], position[m]
-        state.dq[0], state.dtheta[0] = velocity[i], velocity[m]
-        state.tau_spring[0], state.tau_motor[0] = tau_spring[i], tau_motor[i]
-        amount = float(action.amounts(state)[0])
-        out[i] -= action.on_link * amount
-        out[m] -= action.on_motor * amount
-        return amount
-
-    def add_slopes(
-        self,
-        time: float,
-        position: list[float],
-        velocity: list[float],
-        tau_motor: list[float],
-        tau_spring: list[float],
-        slopes: list[float],
-    ) -> None:
-        """Add the slopes over the speeds of both sides."""
-        i, m, action, state = self.i, self.m, self.action, self._moved
-        state.time = time
+    def _put(self, state: SimulationState, instant: _Instant) -> None:
+        time, position, velocity, tau_motor, tau_spring = instant
+        i, m = self.i, self.m
+        object.__setattr__(state, "time", time)
         state.q[:], state.theta[:] = position[i], position[m]
         state.dq[:], state.dtheta[:] = velocity[i], velocity[m]
         state.tau_spring[:], state.tau_motor[:] = tau_spring[i], tau_motor[i]
-        on_link, on_motor = (SMALL_SPEED if velocity[k] >= 0.0 else -SMALL_SPEED for k in (i, m))
-        state.dq[1] += on_link
-        state.dtheta[-1] += on_motor
+
+    def add(self, instant: _Instant, out: list[float]) -> float:
+        """Subtract the torque from the forces `out`, and return it."""
+        self._put(self._state, instant)
+        action = self.action
+        amount = float(action.amounts(self._state)[0])
+        out[self.i] -= action.on_link * amount
+        out[self.m] -= action.on_motor * amount
+        return amount
+
+    def add_slopes(self, instant: _Instant, slopes: list[float]) -> None:
+        """Add the slopes over the speeds of both sides."""
+        i, m, action, state = self.i, self.m, self.action, self._moved
+        self._put(state, instant)
+        step_link, step_motor = (SMALL_SPEED if instant.velocity[k] >= 0.0 else -SMALL_SPEED for k in (i, m))
+        state.dq[1] += step_link
+        state.dtheta[-1] += step_motor
         amounts = action.amounts(state)
         change = (amounts[1:] - amounts[0]).tolist()
-        if m == i:
-            slopes[i] += (action.on_link + action.on_motor) * change[0] / on_link
-        else:
-            slopes[i] += action.on_link * change[0] / on_link
-            slopes[m] += action.on_motor * change[1] / on_motor
+        # without a spring the only moved state is that of both sides
+        slopes[i] += action.on_link * change[0] / step_link
+        slopes[m] += action.on_motor * change[-1] / step_motor
 
 
 def _by_kind(hooks: Sequence[Action], coordinates: Sequence[int]) -> tuple[list[_AtJoint], list[Action]]:

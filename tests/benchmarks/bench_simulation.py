@@ -36,10 +36,20 @@ def real_time_factors(repeats: int) -> None:
         PlantedEffect(make_effect("stribeck_friction", "knee"), np.array([0.3])),
         PlantedEffect(make_effect("torque_ripple", "hip"), np.array([0.1, 0.1])),
     ]
+    single = {
+        name: PlantedEffect(make_effect(name, "knee", **shape), np.array(values))
+        for name, values, shape in (
+            ("torque_ripple", [1.0, 0.5], {"order": 4.0}),
+            ("spring_offset", [1.0], {}),
+            ("backlash", [300.0], {"half_width": 0.002}),
+            ("load_dependent_friction", [0.1], {}),
+        )
+    }
     cases = {
         "exo_leg": (leg, {"periods": 20}),
         "exo_leg, presliding friction": (leg, {"periods": 20, "friction": PreslidingCoulomb()}),
         "exo_leg, two planted effects": (leg, {"periods": 20, "effects": planted}),
+        **{f"exo_leg, {name}": (leg, {"periods": 5, "effects": [effect]}) for name, effect in single.items()},
         "Baxter arm, seven springs": (baxter_arm(), {"periods": 5}),
         "UR10, rigid": (ur10(), {"periods": 5}),
     }
