@@ -224,3 +224,32 @@ def test_it_is_the_same_whether_asked_for_by_joint_or_with_the_whole_robot(leg, 
     ]
     np.testing.assert_allclose(runs[0].motion.theta, runs[1].motion.theta, atol=1e-11)
     np.testing.assert_allclose(runs[0].tau_spring, runs[1].tau_spring, atol=1e-8)
+
+
+COMMAND, SPEED = 12.0, -0.8
+
+
+@pytest.mark.parametrize(("time", "passed"), [(30.0, 30.0), (-30.0, 0.0)], ids=["recorded", "while it settles"])
+@pytest.mark.parametrize(
+    ("name", "values", "shape", "expected"),
+    [
+        ("torque_saturation", [1e-3], {"exponent": 3.0}, lambda t: 1e-3 * COMMAND**3),
+        # a rate per minute that falls with the time constant of 60 s
+        ("torque_constant_drift", [0.2], {"time_constant": 60.0}, lambda t: 0.2 * COMMAND * (1 - np.exp(-t / 60.0))),
+        ("friction_drift", [0.5, 0.1], {"time_constant": 60.0}, lambda t: (0.5 * SPEED - 0.1) * (1 - np.exp(-t / 60))),
+        (
+            "temperature_friction",
+            [0.05, 0.01],
+            {"rise": 20.0, "time_constant": 40.0},
+            lambda t: (0.05 * SPEED - 0.01) * 20.0 * (1 - np.exp(-t / 40.0)),
+        ),
+    ],
+)
+def test_what_depends_on_command_or_time_acts_by_the_command_and_the_time_of_the_recording(
+    leg, name, values, shape, expected, time, passed
+):
+    torques = PlantedTorques(leg, [PlantedEffect(make_effect(name, "knee", **shape), np.array(values))], 0.0)
+    out, position, speed = [0.0] * 6, np.zeros(6), np.zeros(6)
+    speed[4] = SPEED
+    torques.add(time, 0.0, position, speed, [0.0, COMMAND, 0.0], [1.0, 2.0, 3.0], out)
+    np.testing.assert_allclose(out, [0.0, 0.0, 0.0, 0.0, -expected(passed), 0.0], rtol=1e-9)
