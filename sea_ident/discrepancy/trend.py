@@ -180,10 +180,12 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
 def within_periods(
     bench: Bench, fit: Fit, trends: Sequence[Trend], temperature: FloatArray | None = None
 ) -> FloatArray:
-    """Torque of trends in the mean period, beyond what they do to all of its phases alike.
+    """Torque of trends in the mean period, beyond what their mean does to the mean motion.
 
     What drifts from period to period drifts within a period too: its end comes later than its beginning, every time. A
-    mean that closes has little of that left, for towards its end it leads over into the periods before.
+    mean that closes has little of that left, for towards its end it leads over into the periods before. And where the
+    motion drifts with the torque, the mean of their product is not the product of their means: friction that grows
+    turns a motor later and later, and its mean beside a reversal looks like friction that builds up over a distance.
 
     Args:
         bench: the recording.
@@ -210,7 +212,9 @@ def within_periods(
         change = trend.effect.change(time.ravel(), own).reshape(time.shape)
         course = np.einsum("tp,pt->t", weights, change)
         values = trend.effect.referred(trend.values, -float(np.mean(change)))
-        total += (course - course.mean())[:, None] * (data.rows(steady_rows(bench, fit, trend.effect)) @ values)
+        for p in range(data.periods):
+            beyond = weights[:, p] * (change[p] - course.mean())
+            total += beyond[:, None] * (data.rows(steady_rows(bench, fit, trend.effect, p)) @ values)
     return total
 
 

@@ -7,10 +7,11 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import moving, signal_effects
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.discrepancy.trend_values import bend, time_constants
-from sea_ident.effects import Contribution, Effect, effect_classes
+from sea_ident.effects import Contribution, Effect, corrected_motion, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.stiffness_drift import StiffnessDrift
@@ -92,11 +93,18 @@ def trend_effects(bench: Bench) -> list[Effect]:
     return found
 
 
-def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect) -> Contribution:
-    """Link and motor rows (N, n, k) of a trend for a change of one; torques of motors are those that were measured."""
-    state = bench.state(fit.effects)
-    channels = {**(state.channels or {}), "tau_motor": bench.data.tau_motor}
-    rows = effect.steady(replace(state, channels=channels))
+def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect, period: int | None = None) -> Contribution:
+    """Link and motor rows (N, n, k) of a trend for a change of one; torques of motors are those that were measured.
+
+    In the mean motion, or in that of one of the periods.
+    """
+    data, state = bench.data, bench.state(fit.effects)
+    torque = data.tau_motor if period is None else data.period_tau_motor[period]
+    if period is not None:
+        signals = moving(signal_effects(fit.effects))
+        state = replace(state, motion=corrected_motion(data.robot, signals, data.period_motions[period]))
+    state = replace(state, channels={**(state.channels or {}), "tau_motor": torque})
+    rows = effect.steady(state)
     if not isinstance(effect, StiffnessDrift):
         return rows
     # what depends on the load takes it from the stiffness of the model, which is not that of every period

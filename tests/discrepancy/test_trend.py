@@ -16,6 +16,7 @@ from sea_ident.recordings import Recording
 
 LEVEL = 0.05
 DRAWS = 1000
+KNEE = 2  # equation of the motor of the knee
 
 
 def compared(bench):
@@ -167,11 +168,11 @@ def test_size_of_the_test_of_everything_at_once(nothing_missing):
     assert 0.02 < rejected / DRAWS < 0.09
 
 
-def course_in_the_mean(data):
-    """(N,) what grows by one in every period, in the mean motion and torque, without its mean over the period."""
+def in_the_mean(data, each):
+    """(N,) mean of what grows by one in every period times (N, P) what each has, without the mean of that growth."""
     time = np.arange(data.periods) + ((np.arange(data.samples) + 0.5) / data.samples)[:, None]
-    course = np.sum(time * closing_weights(range(data.periods), data.samples), axis=1)
-    return course - course.mean()
+    weights = closing_weights(range(data.periods), data.samples)
+    return np.sum(weights * (time - np.mean(np.sum(weights * time, axis=1))) * each, axis=1)
 
 
 def test_a_drift_within_a_period_is_no_effect_of_its_own(softening):
@@ -184,12 +185,35 @@ def test_a_drift_within_a_period_is_no_effect_of_its_own(softening):
     then = settle(less, less.effects)
     assert then.fit.statistic < now.fit.statistic
     assert then.fit.statistic / then.fit.dof == pytest.approx(1.0, abs=0.2)
-    # a saw, as much of it as a mean that closes has, on the spring torque of the hip, opposite in its two equations
-    deflection = bench.data.motion.deflection[:, 0]
-    saw = course_in_the_mean(bench.data)
-    np.testing.assert_allclose(known[:, 0], -150.0 * bench.data.period / 60.0 * saw * deflection, rtol=0.1, atol=2e-3)
+    # each period's stiffness on its own deflection, but for their means, opposite in the two equations of the hip
+    deflections = np.stack([motion.deflection[:, 0] for motion in bench.data.period_motions], axis=1)
+    torque = -150.0 * bench.data.period / 60.0 * in_the_mean(bench.data, deflections)
+    np.testing.assert_allclose(known[:, 0], torque, rtol=0.1, atol=2e-3)
     np.testing.assert_allclose(known[:, 1], -known[:, 0])
     np.testing.assert_array_equal(known[:, 2:], 0.0)
+
+
+def test_where_the_motion_drifts_with_its_torque_the_mean_of_the_product_is_not_that_of_the_means(laboratory):
+    """A motor that turns later from pass to pass while its friction grows: no friction of the mean motion does that."""
+    data = laboratory.data(laboratory.record(periods=8))
+    later = [
+        replace(motion, dtheta=motion.dtheta + 0.05 * (p - 3.5) * np.array([0.0, 1.0, 0.0]))
+        for p, motion in enumerate(data.period_motions)
+    ]
+    drifting = replace(data, period_motions=tuple(later))
+    bench = Bench(drifting, laboratory.effects)
+    now = settle(bench, bench.effects)
+    effect = bench.anchored(
+        (*now.fit.effects, make_effect("friction_drift", "knee", time_constant=1e8)), now.fit.parameters
+    )[-1]
+    trend = Trend(effect, np.array([0.0, 0.6]), np.zeros(2), 1.0, 0.0, 0.1)
+    known = within_periods(bench, now.fit, [trend])
+    signs = np.stack([np.tanh(motion.dtheta[:, 1] / effect.smoothing) for motion in later], axis=1)
+    expected = 0.6 * data.period / 60.0 * in_the_mean(drifting, signs)
+    np.testing.assert_allclose(known[:, KNEE], expected, rtol=1e-6, atol=1e-9)
+    # much of it is what the mean motion has nothing of
+    alone = 0.6 * data.period / 60.0 * in_the_mean(drifting, np.repeat(signs.mean(axis=1, keepdims=True), 8, axis=1))
+    assert np.linalg.norm(alone - expected) > 0.5 * np.linalg.norm(expected)
 
 
 def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
@@ -200,10 +224,8 @@ def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
     trend = Trend(effect, np.array([0.0, 0.1]), np.zeros(2), 1.0, 0.0, 0.1)
     temperature = np.tile(25.0 + 2.0 * np.arange(8.0)[:, None], (1, 3))
     known = within_periods(bench, now.fit, [trend], temperature)
-    saw = 2.0 * course_in_the_mean(bench.data)
-    knee = [e for e, eq in enumerate(bench.data.equations) if (eq.joint, str(eq.kind)) == ("knee", "motor")]
-    friction = bench.data.rows(effect.steady(bench.state(now.fit.effects)))[:, knee[0], 1]
-    np.testing.assert_allclose(known[:, knee[0]], 0.1 * saw * friction, atol=1e-12)
+    signs = np.stack([np.tanh(motion.dtheta[:, 1] / effect.smoothing) for motion in bench.data.period_motions], axis=1)
+    np.testing.assert_allclose(known[:, KNEE], 0.1 * 2.0 * in_the_mean(bench.data, signs), atol=1e-12)
 
 
 @pytest.mark.parametrize(("time_constant", "named"), [(4.0, False), (7.0, True)])
