@@ -180,7 +180,10 @@ class Transfer:
 def transfer(
     bench: Bench, selection: Selection, now: Settled, positions: Sequence[int] | None = None
 ) -> list[Transfer]:
-    """Try effects that were added on other data: their parameters as they are, the rest of the model fitted anew.
+    """Try effects that were added on other data: their parameters as they are, the model without them fitted anew.
+
+    Each is tried beside the others as they are. Where it fails so, one of these may be what is wrong: it holds all the
+    same where it holds beside the others as the other data would have them.
 
     Args:
         bench: the other data.
@@ -203,7 +206,8 @@ def _transfer_of(bench: Bench, fit: Fit, added: range, now: Settled, position: i
     signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
     own_signal = [effect] if isinstance(effect, SignalEffect) else []
     known, whole = _known(bench, fit, others), _known(bench, fit, added)
-    beside = [*fit.effects[: added.start], *signals, *_history(fit, others)]
+    # friction turns over as it does at the speeds of the other motion: that is no matter of what was added
+    beside = [*now.fit.effects[: added.start], *signals, *_history(fit, others)]
     without = bench.fit(beside, noise, start=start, tangents=False, known=known)
     fixed = bench.fit([*beside, *own_signal], noise, start=start, tangents=False, known=whole)
     unit = now.fit.unit
@@ -229,7 +233,25 @@ def _transfer_of(bench: Bench, fit: Fit, added: range, now: Settled, position: i
     if tested and others and share <= TRANSFERS and harm < EQUALLY_GOOD * unit:
         # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
         tested = tells(without.statistic - alone().statistic)
+    if tested and others and share <= TRANSFERS:
+        share = max(share, _share_beside_free(bench, fit, added, now, position))
     return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
+
+
+def _share_beside_free(bench: Bench, fit: Fit, added: range, now: Settled, position: int) -> float:
+    """Share of what an effect could explain that it does, all others fitted anew; 0 where these leave it nothing."""
+    effect, noise, start = fit.effects[position], now.noise, now.fit.parameters
+    model = now.fit.effects[: added.start]
+    others = [now.fit.effects[p] for p in added if p != position]
+    own = [effect] if isinstance(effect, SignalEffect) else _history(fit, [position])
+    without = bench.refine([*model, *others], noise, start=start, only=len(model))
+    only, known = len(model) + len(own), _known(bench, fit, [position])
+    fixed = bench.refine([*model, *own, *others], noise, start=start, only=only, known=known)
+    possible = without.statistic - min(now.fit.statistic, fixed.statistic)
+    columns = max(len(effect.columns(bench.robot)), 1)
+    if significance(possible, columns, 10, without, noise) >= FAMILY_LEVEL:
+        return 0.0
+    return float((without.statistic - fixed.statistic) / possible)
 
 
 def _history(fit: Fit, positions: Sequence[int]) -> list[Effect]:
