@@ -14,6 +14,7 @@ from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
+from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
 OFFSETS = [("spring_offset", "hip", [-1.2], {}), ("spring_offset", "knee", [-0.4], {})]
 """As much as the play of 2 mrad would take from the spring of the hip, whose deflection keeps its sign in both motions;
@@ -172,6 +173,46 @@ def test_what_others_gain_by_a_refit_does_not_count_against_what_another_motion_
         assert hip.holds
         assert ankle.tested == tested
         assert ankle.holds == (not tested)
+
+
+def ripples(hip, knee):
+    """Torque ripples of hip and knee, of these amplitudes [N m]."""
+    return [
+        ("torque_ripple", "hip", [hip, 0.0], {"order": 4.0}),
+        ("torque_ripple", "knee", [knee, 0.0], {"order": 9.0}),
+    ]
+
+
+def transfers_of(laboratory, used, there, **options):
+    """What was found of one recording is worth on another, with other effects or another friction there."""
+    bench = laboratory.bench(laboratory.record(used, periods=6))
+    start = settle(bench, bench.effects)
+    added = (make_effect(name, joint, **shapes) for name, joint, _, shapes in used)
+    selection = Selection(start, settle(bench, (*bench.effects, *added)), len(used), (1e-9,) * len(used))
+    fit = selection.final.fit
+    other = Bench(laboratory.data(laboratory.record(there, periods=6, motion=1, seed=8, **options)), bench.effects)
+    return transfer(other, selection, settle_again(other, other.predicted(fit.effects, fit.parameters)))
+
+
+def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
+    """The ripple of the knee is far larger on the other motion: that of the hip is what it was."""
+    hip, knee = transfers_of(laboratory, ripples(0.4, 1.0), ripples(0.4, 4.5))
+    assert hip.tested
+    assert hip.holds
+    assert knee.tested
+    assert not knee.holds
+
+
+def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect(laboratory):
+    hip, knee = transfers_of(
+        laboratory,
+        ripples(0.4, 0.4),
+        ripples(0.4, 0.4),
+        friction=SmoothCoulomb(smoothing=0.05),
+        jitter=FrictionJitter.none(),
+    )
+    assert hip.share > 0.8
+    assert knee.share > 0.8
 
 
 def test_fitted_beside_what_is_known_an_effect_comes_out_as_it_does_with_all_free(preloaded):

@@ -232,7 +232,8 @@ def _asymmetric(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-un
 
 def _asymmetric_kink(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
     c, kink = p.size * truth.stiffness[i], p.shape["kink"]
-    hooks[i].spring.append(lambda s, ts: ts + 2.0 * c * max(s.d - kink, 0.0))
+    at_rest = max(-kink, 0.0)  # without it, the spring would be preloaded too: an effect of its own
+    hooks[i].spring.append(lambda s, ts: ts + 2.0 * c * (max(s.d - kink, 0.0) - at_rest))
 
 
 def _maxwell_slip(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
