@@ -44,7 +44,7 @@ SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 SPEED_LAWS = ("stribeck_friction", "nonlinear_viscous_friction")
 """Frictions that are a function of nothing but the speed of their motor, ..."""
 
-OWN_AMOUNT = 3.0
+OWN_AMOUNT = 7.0
 """... and standard deviations that each must have of its own where there are two of one motor."""
 
 DRIVES = 0.1
