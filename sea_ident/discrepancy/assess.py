@@ -206,21 +206,26 @@ def _transfer_of(bench: Bench, fit: Fit, added: range, now: Settled, position: i
     signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
     own_signal = [effect] if isinstance(effect, SignalEffect) else []
     known, whole = _known(bench, fit, others), _known(bench, fit, added)
-    # friction turns over as it does at the speeds of the other motion: that is no matter of what was added
-    beside = [*now.fit.effects[: added.start], *signals, *_history(fit, others)]
-    without = bench.fit(beside, noise, start=start, tangents=False, known=known)
-    fixed = bench.fit([*beside, *own_signal], noise, start=start, tangents=False, known=whole)
+    models = _models(fit, now, added)
+
+    def least(*more: Effect, known: Known) -> Fit:
+        fits = (bench.fit([*model, *more], noise, start=start, tangents=False, known=known) for model in models)
+        return min(fits, key=lambda each: each.statistic)
+
+    history = _history(fit, others)
+    without = least(*signals, *history, known=known)
+    fixed = least(*signals, *history, *own_signal, known=whole)
     unit = now.fit.unit
     remembers = False
     if own_history := _history(fit, [position]):
-        rested = bench.fit([*beside, *own_history], noise, start=start, tangents=False, known=whole)
+        rested = least(*signals, *history, *own_history, known=whole)
         remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
         fixed = rested if remembers else fixed
     columns = max(len(effect.columns(bench.robot)), 1)
 
     def alone() -> Fit:
         """With its parameters and shapes free, those of the others as they are."""
-        return bench.refine([*beside, effect], noise, start=start, only=len(beside), known=known)
+        return bench.refine([*without.effects, effect], noise, start=start, only=len(without.effects), known=known)
 
     def tells(gain: float) -> bool:
         return bool(significance(gain, columns, 10, without, noise) < FAMILY_LEVEL)
@@ -238,15 +243,27 @@ def _transfer_of(bench: Bench, fit: Fit, added: range, now: Settled, position: i
     return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
 
 
+def _models(fit: Fit, now: Settled, added: range) -> list[tuple[Effect, ...]]:
+    """The model without what was added: as it is, and as the other motion has it.
+
+    Friction may turn over as it does at the speeds there, which is no matter of what was added.
+    """
+    return list(dict.fromkeys(effects[: added.start] for effects in (fit.effects, now.fit.effects)))
+
+
 def _share_beside_free(bench: Bench, fit: Fit, added: range, now: Settled, position: int) -> float:
     """Share of what an effect could explain that it does, all others fitted anew; 0 where these leave it nothing."""
-    effect, noise, start = fit.effects[position], now.noise, now.fit.parameters
-    model = now.fit.effects[: added.start]
+    effect, noise = fit.effects[position], now.noise
     others = [now.fit.effects[p] for p in added if p != position]
+
+    def least(*own: Effect, known: Known | None = None) -> Fit:
+        models = [[*model, *own, *others] for model in _models(fit, now, added)]
+        only, start = len(models[0]) - len(others), now.fit.parameters
+        fits = (bench.refine(model, noise, start=start, only=only, known=known) for model in models)
+        return min(fits, key=lambda each: each.statistic)
+
     own = [effect] if isinstance(effect, SignalEffect) else _history(fit, [position])
-    without = bench.refine([*model, *others], noise, start=start, only=len(model))
-    only, known = len(model) + len(own), _known(bench, fit, [position])
-    fixed = bench.refine([*model, *own, *others], noise, start=start, only=only, known=known)
+    without, fixed = least(), least(*own, known=_known(bench, fit, [position]))
     possible = without.statistic - min(now.fit.statistic, fixed.statistic)
     columns = max(len(effect.columns(bench.robot)), 1)
     if significance(possible, columns, 10, without, noise) >= FAMILY_LEVEL:
