@@ -1,7 +1,7 @@
-"""What else an effect could be, whether it holds on another motion, and what could not have been seen."""
+"""What else an effect could be, and what could not have been seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
@@ -10,30 +10,26 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import ABSORBED, Candidate, scan, sought
 from sea_ident.discrepancy.columns import effect_key
-from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.findings import Alternative, Detectability
-from sea_ident.discrepancy.fit import Fit, Known
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import (
     EQUALLY_GOOD,
     FEWEST_TO_SEARCH,
     flat_steps,
     penalty,
     physical,
-    significance,
     slowest,
     spread,
     too_short,
 )
 from sea_ident.discrepancy.linear import off, whiten
-from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, closed_freedom
+from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.search import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
-from sea_ident.effects import Effect, Side
+from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
-from sea_ident.effects.spring_hysteresis import SpringHysteresis
-from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.singular_values import svd
 
 THE_SAME = 0.05
@@ -48,9 +44,6 @@ RIVALS = 8
 NO_BETTER = 0.5
 """Where an effect explains nearly all and has not the form of what is there, one that leaves no more than this share
 more is no worse [-]."""
-
-TRANSFERS = 0.5
-"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect."""
 
 POWER_QUANTILE = 1.645
 """Standard deviations that make 19 detections out of 20."""
@@ -108,174 +101,6 @@ def no_worse(fit: Fit, gain: float) -> float:
     if unit > NEARLY_RIGHT and fit.excess < LITTLE_LEFT * gain:
         return max(EQUALLY_GOOD * unit, NO_BETTER * fit.excess)
     return EQUALLY_GOOD * unit
-
-
-def contribution(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
-    """(H + 1, E) torque of some effects of a fit on the motion of a bench, which may be another one."""
-    total = np.zeros((bench.data.harmonics + 1, len(bench.data.equations)), dtype=np.complex128)
-    for position in positions:
-        effect = fit.effects[position]
-        own = np.array([fit.parameters[c.name] for c in effect.columns(bench.robot)])
-        if len(own):
-            total += bench.column_spectra(effect, fit.effects) @ own
-    return total
-
-
-def _known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
-    """Some effects of a fit as they are, on the motion of a bench: those in a spring carry a part of its stiffness."""
-    stiffness = np.zeros(len(bench.data.equations))
-    for position in positions:
-        effect = fit.effects[position]
-        if effect.side is Side.SPRING and not isinstance(effect, SignalEffect):
-            own = contribution(bench, fit, [position])[:, :, None]
-            stiffness += bench.slopes_of(own, bench.links_of(effect), fit.effects)[:, 0]
-    return Known(contribution(bench, fit, positions), stiffness)
-
-
-def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
-    """(N, E) standard deviation of the torque of an effect over a period, from that of its parameters and shapes."""
-    effect, count = fit.effects[position], len(fit.columns)
-    start = sum(bench.counts(fit.effects)[:position])
-    width = len(effect.columns(bench.robot))
-    directions, factors = [], []
-    if width:
-        directions.append(bench.column_spectra(effect, fit.effects))
-        factors.append(fit.covariance_factor[start : start + width])
-    own = [(k, pair) for k, pair in enumerate(fit.free_shapes) if pair[0] == position]
-    if own:
-        directions.append(bench.tangents(fit.effects, fit.columns, fit.values, [pair for _, pair in own])[0])
-        factors.append(fit.covariance_factor[[count + k for k, _ in own]])
-    if not directions:
-        return np.zeros((bench.data.samples, len(bench.data.equations)))
-    rows = waveform(np.concatenate(directions, axis=2), bench.data.samples)
-    return np.asarray(np.linalg.norm(rows @ np.concatenate(factors), axis=2), dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Transfer:
-    """How an effect does on data that were not used.
-
-    Attributes:
-        share: of what it could explain there, what it does explain with its parameters as they are [-].
-        tested: whether there was enough to explain to tell.
-        statistic: weighted sum of squares that is left there with its parameters as they are.
-        excess: what of it is beyond the noise.
-        unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
-        remembers: whether it needs a constant torque of its own there, which depends on what was before.
-    """
-
-    share: float
-    tested: bool
-    statistic: float = 0.0
-    unit: float = 1.0
-    excess: float = 0.0
-    remembers: bool = False
-
-    @property
-    def holds(self) -> bool:
-        """Whether nothing speaks against it."""
-        return not self.tested or self.share > TRANSFERS
-
-
-def transfer(
-    bench: Bench, selection: Selection, now: Settled, positions: Sequence[int] | None = None
-) -> list[Transfer]:
-    """Try effects that were added on other data: their parameters as they are, the model without them fitted anew.
-
-    Each is tried beside the others as they are. Where it fails so, one of these may be what is wrong: it holds all the
-    same where it holds beside the others as the other data would have them.
-
-    Args:
-        bench: the other data.
-        selection: what was found.
-        now: the found model, fitted anew to the other data, with the noise floor there.
-        positions: of the effects in the model; all that were added by default.
-
-    Returns:
-        One result for each of them.
-    """
-    fit = selection.final.fit
-    added = range(len(fit.effects) - selection.added, len(fit.effects))
-    return [_transfer_of(bench, fit, added, now, position) for position in (added if positions is None else positions)]
-
-
-def _transfer_of(bench: Bench, fit: Fit, added: range, now: Settled, position: int) -> Transfer:
-    """What one effect of a model is worth on other data beside all others that were added, these as they are."""
-    effect, noise, start = fit.effects[position], now.noise, fit.parameters
-    others = [p for p in added if p != position]
-    signals = [fit.effects[p] for p in others if isinstance(fit.effects[p], SignalEffect)]
-    own_signal = [effect] if isinstance(effect, SignalEffect) else []
-    known, whole = _known(bench, fit, others), _known(bench, fit, added)
-    models = _models(fit, now, added)
-
-    def least(*more: Effect, known: Known) -> Fit:
-        fits = (bench.fit([*model, *more], noise, start=start, tangents=False, known=known) for model in models)
-        return min(fits, key=lambda each: each.statistic)
-
-    history = _history(fit, others)
-    without = least(*signals, *history, known=known)
-    fixed = least(*signals, *history, *own_signal, known=whole)
-    unit = now.fit.unit
-    remembers = False
-    if own_history := _history(fit, [position]):
-        rested = least(*signals, *history, *own_history, known=whole)
-        remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
-        fixed = rested if remembers else fixed
-    columns = max(len(effect.columns(bench.robot)), 1)
-
-    def alone() -> Fit:
-        """With its parameters and shapes free, those of the others as they are."""
-        return bench.refine([*without.effects, effect], noise, start=start, only=len(without.effects), known=known)
-
-    def tells(gain: float) -> bool:
-        return bool(significance(gain, columns, 10, without, noise) < FAMILY_LEVEL)
-
-    possible = without.statistic - min((now.fit if others else alone()).statistic, fixed.statistic)
-    tested, share = tells(possible), 0.0
-    if possible > 0.0:
-        share = float((without.statistic - fixed.statistic) / possible)
-    harm = fixed.statistic - without.statistic
-    if tested and others and share <= TRANSFERS and harm < EQUALLY_GOOD * unit:
-        # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
-        tested = tells(without.statistic - alone().statistic)
-    if tested and others and share <= TRANSFERS:
-        share = max(share, _share_beside_free(bench, fit, added, now, position))
-    return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
-
-
-def _models(fit: Fit, now: Settled, added: range) -> list[tuple[Effect, ...]]:
-    """The model without what was added: as it is, and as the other motion has it.
-
-    Friction may turn over as it does at the speeds there, which is no matter of what was added.
-    """
-    return list(dict.fromkeys(effects[: added.start] for effects in (fit.effects, now.fit.effects)))
-
-
-def _share_beside_free(bench: Bench, fit: Fit, added: range, now: Settled, position: int) -> float:
-    """Share of what an effect could explain that it does, all others fitted anew; 0 where these leave it nothing."""
-    effect, noise = fit.effects[position], now.noise
-    others = [now.fit.effects[p] for p in added if p != position]
-
-    def least(*own: Effect, known: Known | None = None) -> Fit:
-        models = [[*model, *own, *others] for model in _models(fit, now, added)]
-        only, start = len(models[0]) - len(others), now.fit.parameters
-        fits = (bench.refine(model, noise, start=start, only=only, known=known) for model in models)
-        return min(fits, key=lambda each: each.statistic)
-
-    own = [effect] if isinstance(effect, SignalEffect) else _history(fit, [position])
-    without, fixed = least(), least(*own, known=_known(bench, fit, [position]))
-    possible = without.statistic - min(now.fit.statistic, fixed.statistic)
-    columns = max(len(effect.columns(bench.robot)), 1)
-    if significance(possible, columns, 10, without, noise) >= FAMILY_LEVEL:
-        return 0.0
-    return float((without.statistic - fixed.statistic) / possible)
-
-
-def _history(fit: Fit, positions: Sequence[int]) -> list[Effect]:
-    """The constants that dry friction in springs keeps of the time before, for some effects of a fit."""
-    joints = [fit.effects[p].joint for p in positions if isinstance(fit.effects[p], SpringHysteresis)]
-    present = {effect_key(effect) for effect in fit.effects}
-    return [offset for joint in joints if effect_key(offset := SpringOffset(joint)) not in present]
 
 
 def detectability(

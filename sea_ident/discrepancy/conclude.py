@@ -10,6 +10,7 @@ from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import BASIC, FRICTION
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.contribution import contribution, torque_std
 from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
@@ -33,6 +34,7 @@ from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import longest_standing
+from sea_ident.discrepancy.transfer import TRANSFERS
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
 from sea_ident.effects.signal import SignalEffect
@@ -226,7 +228,7 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
-    if not holds or any(m.transfer is not None and m.transfer <= assess.TRANSFERS for m in structural):
+    if not holds or any(m.transfer is not None and m.transfer <= TRANSFERS for m in structural):
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
@@ -248,7 +250,7 @@ def verdict_of(
 def _known_better(missing: list[MissingEffect], nameless: tuple[Unnamed, ...]) -> bool:
     """Whether it is known what explains nearly all in the place of everything that does not hold on other data."""
     known = {(each.effect, each.joint) for each in nameless if each.share <= LEAVES}
-    weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= assess.TRANSFERS}
+    weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= TRANSFERS}
     return bool(known) and weak <= known
 
 
@@ -351,8 +353,8 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
     for position in range(first, len(after.effects)):
         effect = after.effects[position]
         label = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
-        explained[label] = waveform(assess.contribution(bench, after, [position]), data.samples)
-        bands[label] = assess.torque_std(bench, after, position)
+        explained[label] = waveform(contribution(bench, after, [position]), data.samples)
+        bands[label] = torque_std(bench, after, position)
     return Waveforms(
         time=data.motion.time - data.motion.time[0],
         equations=labels,

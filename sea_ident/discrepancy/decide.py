@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.findings import Alternative
@@ -16,6 +15,7 @@ from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
 from sea_ident.discrepancy.remembering import remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.discrepancy.transfer import Transfer
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from sea_ident.discrepancy import assess, check
+from sea_ident.discrepancy import check
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.fit import Fit
@@ -17,6 +17,7 @@ from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.discrepancy.transfer import Transfer, transfer
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.exceptions import SeaIdentWarning
@@ -55,7 +56,7 @@ class HeldOut:
     before: Fit
     after: Fit
     noise: NoiseFloor
-    transfers: tuple[assess.Transfer, ...]
+    transfers: tuple[Transfer, ...]
     source: str
     processed: ProcessedRecording | None = None
     recording: Recording | ProcessedRecording | None = None
@@ -71,10 +72,10 @@ class HeldOut:
         found = tried(self.bench, selection, self.source)
         return replace(found, processed=self.processed, recording=self.recording, kind=self.kind)
 
-    def worth(self, selection: Selection, position: int) -> assess.Transfer:
+    def worth(self, selection: Selection, position: int) -> Transfer:
         """What one effect of another selection is worth on the same data, by its position in the model."""
         _, now = _fitted_anew(self.bench, selection)
-        (found,) = assess.transfer(self.bench, selection, now, [position])
+        (found,) = transfer(self.bench, selection, now, [position])
         return found
 
 
@@ -156,7 +157,7 @@ def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     start = selection.start.fit
     before = without_history(other, other.predicted(start.effects, start.parameters), _remembering(selection))
     after, now = _fitted_anew(other, selection)
-    transfers = tuple(assess.transfer(other, selection, now)) if selection.added else ()
+    transfers = tuple(transfer(other, selection, now)) if selection.added else ()
     return HeldOut(other, before, after, other.noise(after), transfers, source)
 
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import assess
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.contribution import contribution
 from sea_ident.discrepancy.data import PeriodData, around_reversals
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Alternative, NextExperiment
@@ -146,7 +146,7 @@ def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: F
         with_it, without = (bench.predicted(effects, truth.parameters) for effects in (truth.effects, others))
         torque = without.residual - with_it.residual
     else:
-        torque = assess.contribution(bench, truth, [position])
+        torque = contribution(bench, truth, [position])
     signal = whiten(whitener, torque)
     signal = signal - free @ (free.T @ signal)
     signal = signal - basis @ (basis.T @ signal)

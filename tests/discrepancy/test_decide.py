@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.assess import Transfer
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import Confirmed
@@ -18,6 +17,7 @@ from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, next_effect
 from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.transfer import Transfer
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.effects import make_effect
 

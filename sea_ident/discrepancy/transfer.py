@@ -1,0 +1,159 @@
+"""Whether an effect that was found holds on data that were not used."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.columns import effect_key
+from sea_ident.discrepancy.contribution import as_known
+from sea_ident.discrepancy.fit import Fit, Known
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, significance
+from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection
+from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Effect
+from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
+
+TRANSFERS = 0.5
+"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect."""
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """How an effect does on data that were not used.
+
+    Attributes:
+        share: of what it could explain there, what it does explain with its parameters as they are [-].
+        tested: whether there was enough to explain to tell.
+        statistic: weighted sum of squares that is left there with its parameters as they are.
+        excess: what of it is beyond the noise.
+        unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
+        remembers: whether it needs a constant torque of its own there, which depends on what was before.
+    """
+
+    share: float
+    tested: bool
+    statistic: float = 0.0
+    unit: float = 1.0
+    excess: float = 0.0
+    remembers: bool = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing speaks against it."""
+        return not self.tested or self.share > TRANSFERS
+
+
+def transfer(
+    bench: Bench, selection: Selection, now: Settled, positions: Sequence[int] | None = None
+) -> list[Transfer]:
+    """Try effects that were added on other data: their parameters as they are, the model without them fitted anew.
+
+    Each is tried beside the others as they are. Where it fails so, one of these may be what is wrong: it holds all the
+    same where it holds beside the others as the other data would have them.
+
+    Args:
+        bench: the other data.
+        selection: what was found.
+        now: the found model, fitted anew to the other data, with the noise floor there.
+        positions: of the effects in the model; all that were added by default.
+
+    Returns:
+        One result for each of them.
+    """
+    fit = selection.final.fit
+    added = range(len(fit.effects) - selection.added, len(fit.effects))
+    wanted = added if positions is None else positions
+    return [_Trial(bench, fit, added, now, position).outcome() for position in wanted]
+
+
+class _Trial:
+    """One effect of a model on data that it was not fitted to.
+
+    Args:
+        bench: the other data.
+        fit: the model as it was found.
+        added: positions of what was added in it.
+        now: the same model, fitted anew to the other data, with the noise floor there.
+        position: of the effect.
+    """
+
+    def __init__(self, bench: Bench, fit: Fit, added: range, now: Settled, position: int) -> None:
+        self._bench, self._fit, self._added, self._now, self._position = bench, fit, added, now, position
+        self._effect = fit.effects[position]
+        self._others = [p for p in added if p != position]
+        # friction may turn over as it does at the speeds of the other motion: that is no matter of what was added
+        self._models = list(dict.fromkeys(effects[: added.start] for effects in (fit.effects, now.fit.effects)))
+
+    def outcome(self) -> Transfer:
+        """What the effect is worth beside all others that were added, these as they are."""
+        signals = [self._fit.effects[p] for p in self._others if isinstance(self._fit.effects[p], SignalEffect)]
+        beside = [*signals, *self._history(self._others)]
+        known, whole = (as_known(self._bench, self._fit, positions) for positions in (self._others, self._added))
+        without, fixed = self._least(known, beside), self._least(whole, beside, self._signal())
+        unit, remembers = self._now.fit.unit, False
+        if own_history := self._history([self._position]):
+            rested = self._least(whole, beside, own_history)
+            remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
+            fixed = rested if remembers else fixed
+
+        def alone() -> Fit:
+            """With its parameters and shapes free, those of the others as they are."""
+            model, only = [*without.effects, self._effect], len(without.effects)
+            return self._bench.refine(model, self._now.noise, start=self._fit.parameters, only=only, known=known)
+
+        free = self._now.fit if self._others else alone()
+        share, tested = self._share(without, fixed, free), self._tells(without, min(free.statistic, fixed.statistic))
+        if tested and self._others and share <= TRANSFERS:
+            if fixed.statistic - without.statistic < EQUALLY_GOOD * unit:
+                # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
+                tested = self._tells(without, alone().statistic)
+            share = max(share, self._share_beside_free())
+        return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
+
+    def _share_beside_free(self) -> float:
+        """Share of what the effect could explain that it does, all others fitted anew; 0 where these leave it none."""
+        others = [self._now.fit.effects[p] for p in self._others]
+
+        def least(own: Sequence[Effect] = (), known: Known | None = None) -> Fit:
+            models = [[*model, *own, *others] for model in self._models]
+            only, start = len(models[0]) - len(others), self._now.fit.parameters
+            fits = (self._bench.refine(m, self._now.noise, start=start, only=only, known=known) for m in models)
+            return min(fits, key=lambda each: each.statistic)
+
+        own = self._signal() or self._history([self._position])
+        without, fixed = least(), least(own, as_known(self._bench, self._fit, [self._position]))
+        if not self._tells(without, min(self._now.fit.statistic, fixed.statistic)):
+            return 0.0
+        return self._share(without, fixed, self._now.fit)
+
+    def _least(self, known: Known, *more: Sequence[Effect]) -> Fit:
+        """The model with some effects more and the torque of others as it is known."""
+        beside, start = [effect for part in more for effect in part], self._fit.parameters
+        fits = (
+            self._bench.fit([*model, *beside], self._now.noise, start=start, tangents=False, known=known)
+            for model in self._models
+        )
+        return min(fits, key=lambda each: each.statistic)
+
+    @staticmethod
+    def _share(without: Fit, fixed: Fit, free: Fit) -> float:
+        """Of what an effect could explain, what it does explain [-]."""
+        possible = without.statistic - min(free.statistic, fixed.statistic)
+        return float((without.statistic - fixed.statistic) / possible) if possible > 0.0 else 0.0
+
+    def _tells(self, without: Fit, statistic: float) -> bool:
+        """Whether there is enough to explain to tell."""
+        columns = max(len(self._effect.columns(self._bench.robot)), 1)
+        return significance(without.statistic - statistic, columns, 10, without, self._now.noise) < FAMILY_LEVEL
+
+    def _signal(self) -> list[Effect]:
+        return [self._effect] if isinstance(self._effect, SignalEffect) else []
+
+    def _history(self, positions: Sequence[int]) -> list[Effect]:
+        """The constants that dry friction in springs keeps of the time before, for some effects."""
+        effects = self._fit.effects
+        joints = [effects[p].joint for p in positions if isinstance(effects[p], SpringHysteresis)]
+        present = {effect_key(effect) for effect in effects}
+        return [offset for joint in joints if effect_key(offset := SpringOffset(joint)) not in present]

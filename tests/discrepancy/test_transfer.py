@@ -1,0 +1,69 @@
+"""Whether an effect holds on another motion: what it is worth there, and what is not its own fault."""
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.transfer import transfer
+from sea_ident.effects import make_effect
+from sea_ident.simulation import FrictionJitter, SmoothCoulomb
+
+
+def test_what_others_gain_by_a_refit_does_not_count_against_what_another_motion_hardly_shows(laboratory):
+    """The ripple of the hip is larger there; that of the ankle counts where it is large enough to be seen."""
+    used, unseen, seen = (
+        [("torque_ripple", "hip", [a, 0.5 * a], {"order": 4.0}), ("torque_ripple", "ankle", [b, 0.0], {"order": 30.0})]
+        for a, b in ((3.0, 0.006), (4.0, 0.006), (4.0, 0.15))
+    )
+    bench = laboratory.bench(laboratory.record(used, periods=5))
+    start = settle(bench, bench.effects)
+    added = (make_effect(name, joint, **shapes) for name, joint, _, shapes in used)
+    selection = Selection(start, settle(bench, (*bench.effects, *added)), 2, (1e-9, 1e-9))
+    fit = selection.final.fit
+    for planted, tested in ((unseen, False), (seen, True)):
+        other = Bench(laboratory.data(laboratory.record(planted, periods=5, motion=1, seed=8)), bench.effects)
+        now = settle_again(other, other.predicted(fit.effects, fit.parameters))
+        hip, ankle = transfer(other, selection, now)
+        assert hip.tested
+        assert hip.holds
+        assert ankle.tested == tested
+        assert ankle.holds == (not tested)
+
+
+def ripples(hip, knee):
+    """Torque ripples of hip and knee, of these amplitudes [N m]."""
+    return [
+        ("torque_ripple", "hip", [hip, 0.0], {"order": 4.0}),
+        ("torque_ripple", "knee", [knee, 0.0], {"order": 9.0}),
+    ]
+
+
+def transfers_of(laboratory, used, there, **options):
+    """What was found of one recording is worth on another, with other effects or another friction there."""
+    bench = laboratory.bench(laboratory.record(used, periods=6))
+    start = settle(bench, bench.effects)
+    added = (make_effect(name, joint, **shapes) for name, joint, _, shapes in used)
+    selection = Selection(start, settle(bench, (*bench.effects, *added)), len(used), (1e-9,) * len(used))
+    fit = selection.final.fit
+    other = Bench(laboratory.data(laboratory.record(there, periods=6, motion=1, seed=8, **options)), bench.effects)
+    return transfer(other, selection, settle_again(other, other.predicted(fit.effects, fit.parameters)))
+
+
+def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
+    """The ripple of the knee is far larger on the other motion: that of the hip is what it was."""
+    hip, knee = transfers_of(laboratory, ripples(0.4, 1.0), ripples(0.4, 4.5))
+    assert hip.tested
+    assert hip.holds
+    assert knee.tested
+    assert not knee.holds
+
+
+def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect(laboratory):
+    hip, knee = transfers_of(
+        laboratory,
+        ripples(0.4, 0.4),
+        ripples(0.4, 0.4),
+        friction=SmoothCoulomb(smoothing=0.05),
+        jitter=FrictionJitter.none(),
+    )
+    assert hip.share > 0.8
+    assert knee.share > 0.8
