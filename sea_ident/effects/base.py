@@ -223,6 +223,8 @@ class Effect(ABC):
     shapes: ClassVar[tuple[Shape, ...]] = ()
     depth: ClassVar[int] = 0
     """Place on the way from what is recorded to the bodies: an encoder errs before the link bends behind it."""
+    depends_on: ClassVar[tuple[str, ...]] = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
+    """Parts of a motion that its columns depend on; a design takes no derivatives by the others."""
 
     @abstractmethod
     def columns(self, robot: Robot) -> tuple[Column, ...]:

@@ -320,6 +320,9 @@ class _OtherPart:
         for name in STATES if self.model.elastic else STATES[:3]:
             partner = {"q": "theta", "dq": "dtheta", "ddq": "ddtheta"}.get(name)
             names = [name] if self.model.elastic or partner is None else [name, partner]
+            if not set(names) & set(self.effect.depends_on):
+                parts.extend([np.zeros((len(self.motion), self.model.rows, len(self.which)))] * n)
+                continue
             for i in range(n):
                 there, back = (self._rows(_moved(self.motion, names, i, sign * self._STEP)) for sign in (1.0, -1.0))
                 parts.append((there - back) / (2.0 * self._STEP))

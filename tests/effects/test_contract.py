@@ -9,6 +9,7 @@ import pytest
 from sea_ident.base_parameters import random_motion
 from sea_ident.effects import (
     Anchor,
+    Effect,
     JointEffect,
     SimulationState,
     State,
@@ -113,6 +114,19 @@ def test_columns_match_what_is_computed(name, leg):
         assert rows.link.shape == rows.motor.shape == (len(motion), leg.n, len(columns))
         assert np.all(np.isfinite(rows.link))
         assert np.all(np.isfinite(rows.motor))
+
+
+@pytest.mark.parametrize("name", [name for name, e in effect_classes().items() if e.depends_on != Effect.depends_on])
+def test_columns_depend_on_nothing_else_of_the_motion(name, leg):
+    motion, rng = smooth_motion(leg), np.random.default_rng(5)
+    for effect in effect_classes()[name].instances(leg):
+        ready = anchored(effect, leg)
+        rest = set(Effect.depends_on) - set(ready.depends_on)
+        moved = replace(motion, **{part: rng.normal(size=motion.q.shape) for part in sorted(rest)})
+        before, after = (ready.evaluate(State(leg, each)) for each in (motion, moved))
+        assert np.any(before.link)
+        np.testing.assert_array_equal(before.link, after.link)
+        np.testing.assert_array_equal(before.motor, after.motor)
 
 
 @pytest.mark.parametrize("name", sorted(effect_classes()))

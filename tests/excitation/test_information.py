@@ -95,6 +95,17 @@ def test_gradient_of_every_criterion(robot_of, criterion):
     assert gradient @ direction.ravel() == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("effect", [make_effect("base_tilt"), make_effect("external_force", "knee", stop=5.0)])
+def test_gradient_with_an_effect_that_the_position_alone_matters_to(robot_of, effect):
+    robot = robot_of("exo_leg")
+    information, criterion = problem(robot, (*smooth_friction(robot), effect), samples=200)
+    point, direction = random_coefficients(robot), random_coefficients(robot, seed=5)
+    local = information.model(point)
+    gradient = local.gradient(criterion.local(local.matrix).derivative)
+    expected = directional(lambda x: criterion.value(information.matrix(x)), point, direction, step=1e-4)
+    assert gradient @ direction.ravel() == pytest.approx(expected, rel=1e-6)
+
+
 @pytest.mark.parametrize("name", ["exo_leg", "ur10", "panda"])
 def test_gradient_of_log_det_by_inverse_dynamics(robot_of, name):
     """An independent method: RNEA is linear in the inertial parameters.
