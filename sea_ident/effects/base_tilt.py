@@ -36,7 +36,7 @@ class BaseTilt(Effect):
     name: ClassVar[str] = "base_tilt"
     side: ClassVar[Side] = Side.LINK
     source: ClassVar[str] = "Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, section 9.3"
-    depends_on: ClassVar[tuple[str, ...]] = ("q", "theta")
+    depends_on: ClassVar[tuple[str, ...]] = ("q",)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inertial", tuple(float(value) for value in self.inertial))

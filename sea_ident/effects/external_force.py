@@ -65,7 +65,7 @@ class ExternalForce(Effect):
         Shape("point_y", "m", -_REACH, _REACH, logarithmic=False),
         Shape("point_z", "m", -_REACH, _REACH, logarithmic=False),
     )
-    depends_on: ClassVar[tuple[str, ...]] = ("q", "theta")
+    depends_on: ClassVar[tuple[str, ...]] = ("q",)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """Force along the axes of the base."""
