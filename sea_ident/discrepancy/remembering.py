@@ -19,7 +19,7 @@ from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 
@@ -63,7 +63,7 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
     effect, found = now.effects[position], held.transfers[position - len(now.effects) + selection.added]
     if not isinstance(effect, SpringOffset) or not found.tested:
         return None
-    if found.excess < EQUALLY_GOOD * found.unit:
+    if found.excess < EQUALLY_GOOD * found.unit or SpringHysteresis.name not in effect_classes():
         return None
     if effect_key(SpringHysteresis(effect.joint)) in {effect_key(each) for each in now.effects}:
         return None

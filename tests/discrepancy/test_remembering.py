@@ -13,7 +13,7 @@ from sea_ident.discrepancy.remembering import CONFIRMED, remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.trend import TrendTest
-from sea_ident.effects import make_effect
+from sea_ident.effects import effect_classes, make_effect
 
 JOINT = "knee"
 HERE = -0.5
@@ -56,6 +56,17 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         # it never slips on the motion that was used
         travel = bench.data.motion.deflection[:, bench.robot.index(JOINT)]
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
+
+
+def test_a_library_without_dry_friction_in_springs_names_none(laboratory, offset, monkeypatch):
+    bench, selection = offset
+    planted = [("spring_offset", JOINT, [0.4 * HERE], {})]
+    other = laboratory.bench(laboratory.record(planted, periods=8, seed=9, motion=1))
+    held, position = tried(other, selection, "another motion"), len(selection.start.fit.effects)
+    assert remembering(bench, selection, held, position).effect == "spring_hysteresis"
+    less = {name: kind for name, kind in effect_classes().items() if name != "spring_hysteresis"}
+    monkeypatch.setattr("sea_ident.discrepancy.remembering.effect_classes", lambda: less)
+    assert remembering(bench, selection, held, position) is None
 
 
 @pytest.mark.parametrize("amounts", [[1.0, 3.0], [2.0, 1.0]])
