@@ -34,7 +34,7 @@ from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import longest_standing
-from sea_ident.discrepancy.transfer import TRANSFERS
+from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
 from sea_ident.effects.signal import SignalEffect
@@ -228,7 +228,8 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
-    if not holds or any(m.transfer is not None and m.transfer <= TRANSFERS for m in structural):
+    least = TRANSFERS_ALONE if len(structural) == 1 else TRANSFERS
+    if not holds or any(m.transfer is not None and m.transfer <= least for m in structural):
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL

@@ -16,7 +16,11 @@ from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 
 TRANSFERS = 0.5
-"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect."""
+"""Share of what an effect could explain of other data that it must explain as it was found to be more than suspect
+..."""
+
+TRANSFERS_ALONE = 0.7
+"""... and the same where nothing else is missing that could spoil it: then it holds in part only."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.standing import Standing
+from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
 
@@ -75,7 +76,10 @@ def paragraph(facts: Facts) -> str:
     if facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
         parts.append(f"{_not_compared(facts, facts.standing)}.")
     if facts.verdict is Verdict.SUSPECT:
-        parts.append("What explains this recording does not explain the held-out one: do not use it; excite more.")
+        fully = "" if _part(facts) is None else " as well"
+        parts.append(
+            f"What explains this recording does not explain the held-out one{fully}: do not use it; excite more."
+        )
     return " ".join(parts)
 
 
@@ -194,6 +198,13 @@ def _name(m: MissingEffect) -> str:
     return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
 
 
+def _part(facts: Facts) -> float | None:
+    """Share of what the only effect could explain of other data that it does, where it holds in part there [-]."""
+    shares = [m.transfer for m in facts.missing]
+    alone = shares[0] if len(shares) == 1 else None
+    return alone if alone is not None and TRANSFERS < alone <= TRANSFERS_ALONE else None
+
+
 def _opening(facts: Facts) -> str:
     names = ", ".join(f"{_name(m)} ({m.extent})" for m in facts.missing)
     match facts.verdict:
@@ -216,6 +227,11 @@ def _opening(facts: Facts) -> str:
                 if m.alternatives
             )
             return f"The model lacks {names}; this motion does not tell {alike}."
+        case Verdict.SUSPECT if (part := _part(facts)) is not None:
+            return (
+                f"Something is missing; it looks like {names}, but that holds on other data in part only: as it was "
+                f"found it explains {100 * part:.0f} % of what it could explain there."
+            )
         case Verdict.SUSPECT:
             return f"Something is missing; it looks like {names}, but that does not hold on other data."
         case Verdict.NOT_IN_LIBRARY:

@@ -158,6 +158,10 @@ def test_every_verdict_follows_from_findings():
     assert verdict([effect], remainder=0.01, unexplained=0.6, trends=LeavesAnother) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
     assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
+    # what else is missing may spoil one of several, but not one that is alone
+    assert verdict([replace(effect, transfer=0.65)]) is Verdict.SUSPECT
+    assert verdict([replace(effect, transfer=0.75)]) is Verdict.NAMED
+    assert verdict([replace(effect, transfer=0.65), friction]) is Verdict.NAMED
     assert verdict([effect], holds=False) is Verdict.SUSPECT
     assert verdict([], remainder=0.01) is Verdict.NOT_IN_LIBRARY
     assert verdict([effect], fatal=True) is Verdict.CANNOT_TELL

@@ -137,3 +137,13 @@ def test_what_is_not_compared_is_said_where_nothing_is_missing_and_warned_of_whe
     assert [text[:23] for text in reservations(much)] == ["Beside reversals 21.0% "]
     assert "not compared" not in paragraph(replace(much, verdict=Verdict.NAMED))
     assert "not compared" not in paragraph(replace(nothing, standing=Standing("hip", 0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("transfer", "said"), [(0.1, "does not hold"), (0.63, "in part only: as it was found it explains 63 %")]
+)
+def test_a_suspect_says_how_far_it_holds(transfer, said):
+    found = facts(Verdict.SUSPECT)
+    text = paragraph(replace(found, missing=(replace(found.missing[0], transfer=transfer),)))
+    assert said in text
+    assert ("as well: do not use it" in text) == (transfer > 0.5)
