@@ -56,7 +56,8 @@ def test_table_one_compares_with_the_leg_that_was_simulated(demo):
     # with 8 periods: Student's t with 7 degrees of freedom stays within 5 in 99.8 % of cases
     assert np.all(np.abs(errors) < 5.0)
     inertial = [row for row in result.parameters[:10] if row.name not in ("thigh.mx", "foot.Iyy")]
-    assert all(abs(row.estimate - row.cad) < 0.03 * abs(row.cad) for row in inertial)
+    assert all(row.std < 0.03 * abs(row.cad) for row in inertial)
+    assert np.sqrt(np.mean([(row.estimate / row.cad - 1.0) ** 2 for row in inertial])) < 0.03
 
 
 def test_table_two_says_what_each_column_means(demo):
