@@ -16,7 +16,7 @@ from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
-from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.data import PeriodData, period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.drifting import drifting
@@ -27,7 +27,7 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.next_experiment import with_next_experiment
-from sea_ident.discrepancy.reference import compare_with_reference
+from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference, identified_like
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, still_needed, without
@@ -40,7 +40,7 @@ from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
-from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
@@ -131,15 +131,15 @@ def diagnose(
         drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
         away = (confirmed.bench, confirmed.final)
         nameless = (*unnamed(bench, selection, held, away), *stand_ins(bench, selection), *drifts)
-    change = compare_with_reference(bench, selection.start.fit, selection.start.noise, reference)
+    as_identified = _as_identified(recording, processed, robot)
+    change, change_notes = _against(reference, as_identified, bench.data)
     tell("simulating", 0.85)
-    repaired = repaired_model(model, _as_identified(recording, processed, robot), selection.final.fit)
+    repaired = repaired_model(model, as_identified, selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
     sticking = _sticking(bench, selection)
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    notes = replace(
-        notes, warnings=(*notes.warnings, *found.notes, *basic_notes, *sticking, *held_notes, *forward.notes)
-    )
+    said = (*notes.warnings, *found.notes, *basic_notes, *sticking, *held_notes, *change_notes, *forward.notes)
+    notes = replace(notes, warnings=said)
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
@@ -297,6 +297,18 @@ def _as_identified(
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         return process(recording, robot, period=processed.period)
+
+
+def _against(
+    reference: Model | None, processed: ProcessedRecording, data: PeriodData
+) -> tuple[ParameterChange | None, tuple[str, ...]]:
+    """How the parameters differ from those of an earlier model, and why that cannot be said where it cannot."""
+    if reference is None:
+        return None, ()
+    try:
+        return compare_with_reference(identified_like(reference, data.robot, processed), reference, data), ()
+    except SeaIdentError as error:
+        return None, (f"not compared with the reference, whose effects this recording does not determine: {error}",)
 
 
 def _forward(

@@ -59,13 +59,18 @@ class Facts:
     sound: bool = True
     standing: Standing | None = None
 
+    @property
+    def added(self) -> tuple[MissingEffect, ...]:
+        """What is missing from the model, not from the reference alone."""
+        return self.missing if self.change is None else tuple(m for m in self.missing if m not in self.change.missing)
+
 
 def paragraph(facts: Facts) -> str:
     """One paragraph that a person can act on."""
     parts = [_opening(facts)]
-    if facts.missing and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
+    if facts.added and facts.verdict not in (Verdict.NONE, Verdict.CANNOT_TELL):
         drifting = {(t.effect.name, t.effect.joint) for t in facts.trend.trends}
-        if all((m.effect, m.joint) in drifting for m in facts.missing):
+        if all((m.effect, m.joint) in drifting for m in facts.added):
             parts.append("It shows in the comparison of the periods; the mean over all of them hides it.")
         else:
             parts.append(_gap_sentence(facts.gap, facts.units))
@@ -152,17 +157,17 @@ def reservations(facts: Facts) -> list[str]:
             f"{facts.periods} periods only: the noise floor is uncertain and small effects are not told from it; "
             f"record {FEW_PERIODS} or more"
         )
-    if facts.missing and facts.kind is Kind.SAME_MOTION:
+    if facts.added and facts.kind is Kind.SAME_MOTION:
         found.append(
             "the held-out recording repeats the motion of this one, which is weaker than another motion, as a wrong "
             "name repeats itself with the motion. Record another motion"
         )
-    elif facts.missing and facts.kind is Kind.OTHER_PERIODS:
+    elif facts.added and facts.kind is Kind.OTHER_PERIODS:
         found.append(
             "no held-out motion was given: every other period of this one was held out, which is weaker, as a wrong "
             "name repeats itself in every period. Record another motion"
         )
-    elif facts.missing and facts.kind is None:
+    elif facts.added and facts.kind is None:
         found.append("no held-out motion was given: what is named was not tested on another motion")
     if facts.standing is not None and facts.standing.share > STANDS_LONG:
         found.append(f"{_not_compared(facts, facts.standing)}. Let the joint pass zero velocity faster")
@@ -239,7 +244,10 @@ def _opening(facts: Facts) -> str:
             better = "".join(f" {relative.sentence}" for relative in facts.nameless)
             return f"Something is missing that is not in the library.{near}{better}"
         case Verdict.ONLY_AGAINST_REFERENCE:
-            return f"The model fits, but its parameters are not those of the reference: {names or 'a change'}."
+            if not facts.missing:
+                return "The model fits, but its parameters are not those of the reference, in a way that has no name."
+            changed = "; ".join(f"{_name(m)}, {m.parameters[0]} ({m.extent})" for m in facts.missing)
+            return f"The model fits, but its parameters are not those of the reference. What changed: {changed}."
         case _ if not facts.sound:
             return "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."
         case _ if facts.p_value < DISAGREES:

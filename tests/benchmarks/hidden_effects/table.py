@@ -120,6 +120,8 @@ def lines_of(scores: list[Score]) -> list[Line]:
     reference = by_row["reference"]
     add(_share("reference", "effect and joint by reference", ">= 95 %",
                (s.finder(s.main) is not None for s in reference), lambda x: x >= 0.95))  # fmt: skip
+    add(_share("reference", "precision", "-", (f not in s.false() for s in reference for f in s.found),
+               lambda x: True))  # fmt: skip
     for row in ("one", "two", "main_small"):
         right = [s for s in by_row[row] if s.finder(s.main) is not None and not s.false()]
         add(_number(row, "held-out gap shrink, median where named rightly", ">= 0.8", (s.shrink_holdout for s in right),

@@ -1,0 +1,88 @@
+"""Against an earlier model: what changed is found within its uncertainty, and nothing where nothing did."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import sea_ident
+from sea_ident.discrepancy.reference import LEVEL, compare_with_reference, identified_like
+from sea_ident.effects import make_effect
+from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.processing import process
+
+MASS = 1.5
+PAYLOAD = [MASS, 0.03, 0.0, 0.15, 0.01, 0.01, 0.004, 0.0, 0.0, 0.0]
+
+
+def payload(laboratory):
+    """A mass on the foot, away from its frame."""
+    count = len(make_effect("payload", "ankle").columns(laboratory.leg))
+    return ("payload", "ankle", PAYLOAD[:count], {})
+
+
+@pytest.fixture(scope="module")
+def compared(laboratory, leg):
+    """Compares a recording with the model of another."""
+
+    def compare(recording, earlier):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeaIdentWarning)
+            reference = sea_ident.identify(leg, earlier, period=5.0)
+            processed = process(recording, leg, period=5.0)
+        now = identified_like(reference, leg, processed)
+        return compare_with_reference(now, reference, laboratory.data(recording))
+
+    return compare
+
+
+def test_nothing_changed_by_another_motion(laboratory, compared):
+    found = compared(laboratory.record(seed=1, motion=1), laboratory.record(seed=11))
+    assert found.p_value > LEVEL
+    assert not found.changed
+    assert not found.missing
+
+
+@pytest.mark.slow
+def test_nothing_changed_at_the_level_that_is_said(laboratory, compared):
+    """Over two motions and twelve pairs of recordings; p-values that are too small would show."""
+    found = [
+        compared(laboratory.record(seed=2 * k, motion=k % 2), laboratory.record(seed=2 * k + 1, motion=0))
+        for k in range(12)
+    ]
+    p_values = np.array([each.p_value for each in found])
+    assert stats.binomtest(int(np.sum(p_values < 0.05)), len(found), 0.05, "greater").pvalue > 0.01
+    assert p_values.min() > LEVEL
+    assert not any(each.changed or each.missing for each in found)
+
+
+@pytest.mark.parametrize("motion", [0, 1])
+def test_a_payload_is_found_within_its_uncertainty_and_alone(laboratory, compared, motion):
+    found = compared(laboratory.record([payload(laboratory)], motion=motion), laboratory.record(seed=11))
+    assert [(m.effect, m.joint) for m in found.missing] == [("payload", "ankle")]
+    mass = found.missing[0].parameters[0]
+    assert mass.unit == "kg"
+    assert abs(mass.value - MASS) < 4.0 * mass.std
+    assert mass.std < 0.05
+
+
+def test_two_changes_are_told_apart_each_with_its_own_torque(laboratory, compared):
+    rubbed = ("coulomb_friction", "knee", [1.0], {})
+    found = compared(laboratory.record([payload(laboratory), rubbed]), laboratory.record(seed=11))
+    by_name = {(m.effect, m.joint): m for m in found.missing}
+    assert set(by_name) == {("payload", "ankle"), ("coulomb_friction", "knee")}
+    friction = by_name["coulomb_friction", "knee"]
+    assert abs(friction.parameters[0].value - 1.0) < 4.0 * friction.parameters[0].std
+    assert friction.torque_share != by_name["payload", "ankle"].torque_share
+
+
+def test_all_torque_constants_have_the_share_of_torque_that_they_changed_by(laboratory, compared):
+    recording = laboratory.record()
+    columns = {name: 1.03 * v if name.startswith("current_") else v for name, v in recording.columns.items()}
+    found = compared(replace(recording, columns=columns), laboratory.record(seed=11))
+    assert [(m.effect, m.joint) for m in found.missing] == [("torque_constant", None)]
+    change = found.missing[0].parameters[0]
+    assert abs(change.value - 0.03) < 4.0 * change.std
+    assert found.missing[0].torque_share == pytest.approx(0.03, rel=0.05)
