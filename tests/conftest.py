@@ -1,6 +1,43 @@
-"""What all tests share: one thread for each of the processes that pytest starts, which would compete for the cores."""
+"""What all tests share: one thread for each of the processes that pytest starts, and the command line without one."""
 
 import os
+import signal
+import sys
+import warnings
+from dataclasses import dataclass
 
+import pytest
+
+# threads would compete for the cores with the processes
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command line said, and how it ended."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def call_here(monkeypatch, capsys):
+    """Calls the command line in this process, for a process of its own spends a second on its imports."""
+    from sea_ident.cli import main
+
+    def call(*arguments: object, cwd) -> Answer:
+        monkeypatch.setattr(sys, "argv", ["sea-ident", *map(str, arguments)])
+        monkeypatch.chdir(cwd)
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
+                main()
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+        code = ended.value.code
+        return Answer(code if isinstance(code, int) else int(code is not None), *capsys.readouterr())
+
+    return call

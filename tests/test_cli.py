@@ -253,11 +253,11 @@ def test_a_report_needs_the_model_file_only(chain):
         (("validate", "model.json", "rec.csv", "--column", "q_hip=a", "--column", "q_hip=b"), "twice"),
     ],
 )
-def test_bad_input_names_the_culprit_and_writes_nothing(chain, arguments, expected):
+def test_bad_input_names_the_culprit_and_writes_nothing(chain, call_here, arguments, expected):
     folder = chain[0]
     (folder / "bad.csv").write_text("time,q_hip\n0,0\n1,nan\n")
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    done = call(*arguments, cwd=folder)
+    done = call_here(*arguments, cwd=folder)
     assert done.returncode == 2, done.stderr
     assert expected in done.stderr
     assert "Traceback" not in done.stderr

@@ -109,9 +109,9 @@ def test_limits_in_space_are_kept_and_told(tmp_path):
         (("--self-collision", "-1"), "distance is -1.0 m"),
     ],
 )
-def test_bad_input_is_refused_and_nothing_is_written(tmp_path, arguments, expected):
+def test_bad_input_is_refused_and_nothing_is_written(tmp_path, call_here, arguments, expected):
     (tmp_path / "there").mkdir()
-    done = call("excite", "exo_leg", "--out", "e.json", *QUICK, *arguments, cwd=tmp_path)
+    done = call_here("excite", "exo_leg", "--out", "e.json", *QUICK, *arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert expected in done.stderr
     assert "Traceback" not in done.stderr

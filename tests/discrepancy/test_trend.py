@@ -47,6 +47,7 @@ def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
     }
 
 
+@pytest.mark.slow
 def test_a_third_drift_has_a_name_too(laboratory):
     planted = [
         ("stiffness_drift", "ankle", [-20.0], {}),
@@ -83,6 +84,7 @@ def test_a_spring_that_warms_up_has_its_first_rate_and_its_time_constant(laborat
     assert abs(trend.effect.time_constant - 20.0) < 3.0 * trend.time_constant_std < 5.0
 
 
+@pytest.mark.slow
 def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     """Half of it within two minutes: the torque that the record shows is another share of every other one."""
     bench = laboratory.bench(laboratory.record([("torque_constant_drift", "knee", [-0.25], {})], periods=16))
@@ -92,6 +94,7 @@ def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     assert abs(trend.values[0] + 0.25) < 3.0 * trend.stds[0] < 0.06
 
 
+@pytest.mark.slow
 def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(laboratory):
     recording = laboratory.record([("temperature_friction", "knee", [0.0, -0.05], {"time_constant": 24.0})], periods=12)
     whole = laboratory.data(recording)
@@ -107,6 +110,7 @@ def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(l
     assert cos2 > 0.95
 
 
+@pytest.mark.slow
 def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch):
     """It rises for half of the recording and falls again: no course in time does that."""
 
