@@ -19,6 +19,7 @@ that no periodic motion tells. At joints with such a spring the mean of q is not
 
 import warnings as python_warnings
 from dataclasses import dataclass, field, replace
+from math import ceil
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -27,6 +28,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import corrected_motion
+from sea_ident.effects.memory import MemoryEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.estimation import Model
@@ -46,8 +48,9 @@ from sea_ident.simulation import (
 )
 from sea_ident.simulation.reference import PeriodicReference, Reference
 
-LEAD_PERIODS = 2
-"""Periods that are simulated from the measured state; the last one is compared."""
+LEAD = 1.0
+"""Time that a motion without memory runs in from the measured state before it is compared [s]; one with memory runs in
+for a period, at the end of which it has passed all reversals."""
 
 REPRODUCED = 0.05
 """Share of the torque up to which a controller that is only assumed must give the torque that was measured."""
@@ -289,31 +292,34 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
         SeaIdentError: the model cannot be simulated, or its motion diverges.
     """
     built = plant_from_identified(model)
-    samples = processed.samples
+    samples, period = processed.samples, command.reference.period
+    remembers = any(isinstance(planted.effect, MemoryEffect) for planted in built.effects)
+    lead = samples if remembers else min(ceil(LEAD / period * samples), samples)
+    first = samples - lead
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         run = simulate(
             model.robot,
             command.reference,
-            periods=LEAD_PERIODS,
+            periods=1,
             sensors=SensorNoise.none(),
             jitter=FrictionJitter.none(),
             controller=command.driving(model, processed),
             friction=built.friction,
             plant=built.plant,
             effects=built.effects,
-            rate=samples / command.reference.period,
-            start=actual(model, processed)[0][0:1],
+            rate=samples / period,
+            start=actual(model, processed)[0][first : first + 1],
+            lead=lead * period / samples,
         )
     recorded, robot = run.recording, model.robot
-    last = slice(-samples, None)
-    q = recorded.channel("q", robot.joint_names)[last]
+    q = recorded.channel("q", robot.joint_names)
     theta = q.copy()
     for i in robot.elastic_indices:
-        theta[:, i] = recorded.columns[f"theta_{robot.joint_names[i]}"][last]
-    torque = run.tau_motor[last]
+        theta[:, i] = recorded.columns[f"theta_{robot.joint_names[i]}"]
+    torque = run.tau_motor
     if all(recorded.has("tau_motor", name) for name in robot.joint_names):
-        torque = recorded.channel("tau_motor", robot.joint_names)[last]
+        torque = recorded.channel("tau_motor", robot.joint_names)
     return {"q": q, "theta": theta, "tau": torque}
 
 

@@ -20,7 +20,7 @@ from sea_ident.simulation.friction import FrictionJitter, FrictionLaw, SmoothCou
 from sea_ident.simulation.passes import Clock, Passes
 from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
 from sea_ident.simulation.planted import PlantedTorques, altered_robot, check_planted
-from sea_ident.simulation.reference import HasSeries, as_reference
+from sea_ident.simulation.reference import HasSeries, Reference, as_reference
 from sea_ident.simulation.result import Simulation
 from sea_ident.simulation.rosenbrock import ros34pw2
 from sea_ident.simulation.sensors import SensorNoise, WarmUp, sensed_columns
@@ -57,6 +57,7 @@ def simulate(
     step: float = 2.5e-3,
     settling: Settling | None = None,
     start: Motion | None = None,
+    lead: float = 0.0,
     progress: Callable[[int], None] | None = None,
 ) -> Simulation:
     """Simulate an experiment: the motors follow a reference, the sensors are recorded.
@@ -85,6 +86,7 @@ def simulate(
         settling: when the motion counts as periodic.
         start: its first sample is the initial state, and nothing is settled; by default a Fourier series is settled,
             and a Motion starts with its own velocity and the links in static equilibrium.
+        lead: time from `start` to the recording, one period of a Fourier series at most [s].
         progress: called with the number of periods recorded so far, from 0 when the recording begins.
 
     Returns:
@@ -107,6 +109,7 @@ def simulate(
     clock, method = Clock.build(follow, rate, step), ros34pw2()
     drive = (controller or VelocityController()).drive(robot, follow, clock.stage_times(method.nodes))
     state = _initial_state(plant, drive, start)
+    lead_samples = _lead_samples(lead, start, follow, clock)
     streams = np.random.SeedSequence(seed).spawn(2)
 
     # -- the closed loop
@@ -128,7 +131,7 @@ def simulate(
         planted = None
     system = ClosedLoop(plant, drive, motors, links, planted, method, clock.step)
     system.check_mass(state)
-    system.accept(follow.begin - clock.duration, state)
+    system.accept(follow.begin - (lead_samples * clock.interval or clock.duration), state)
     passes = Passes(system, drive, clock, len(method.nodes), follow.begin)
 
     # -- settle, then record
@@ -145,6 +148,8 @@ def simulate(
                 f"after {settling_periods} settling periods the motion still changes by {settled:.2g} (rad or m) from "
                 "one period to the next"
             )
+    if lead_samples:
+        state = passes.lead_in(state, lead_samples)
     varied = FrictionJitter.usual(robot) if jitter is None else (jitter,) * robot.n
     seeds = streams[0].spawn(robot.n)
     system.replace_motor_friction([v.on(f, child) for v, f, child in zip(varied, motors, seeds, strict=True)])
@@ -213,6 +218,22 @@ def _initial_state(plant: Plant, drive: Drive, start: Motion | None) -> FloatArr
     if start is None and len(elastic) and np.array_equal(q, theta):
         q = link_position_at_rest(plant, theta)
     return np.concatenate([q, theta[elastic], first.dq[0], first.dtheta[0, elastic]])
+
+
+def _lead_samples(lead: float, start: Motion | None, follow: Reference, clock: Clock) -> int:
+    """Sampling intervals of the time before the recording."""
+    if lead == 0.0:
+        return 0
+    if start is None or follow.period is None:
+        raise SimulationError(
+            f"a lead of {lead} s begins in a known state: give `start`, and a Fourier series to follow"
+        )
+    samples = round(lead / clock.interval) if 0.0 < lead < np.inf else 0
+    if not 0 < samples <= clock.samples:
+        raise SimulationError(
+            f"lead is {lead} s; give more than {0.5 * clock.interval:g} s, and {clock.duration:g} s at most"
+        )
+    return samples
 
 
 def _sampled(reference: Motion, time: FloatArray, clock: Clock, stages: int) -> Motion:

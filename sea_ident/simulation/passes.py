@@ -69,6 +69,10 @@ class Passes:
         """State after one pass that is not recorded, in the time before the recording."""
         return self._run(state, self._begin - self._clock.duration, keep=False)
 
+    def lead_in(self, state: FloatArray, samples: int) -> FloatArray:
+        """State at the begin of the recording, from that so many samples before it; none of it is recorded."""
+        return self._run(state, self._begin - self._clock.duration, self._clock.samples - samples, keep=False)
+
     def record(self, state: FloatArray, number: int) -> FloatArray:
         """State after the recorded pass of this number."""
         return self._run(state, self._begin + number * self._clock.duration, keep=True)
@@ -77,10 +81,11 @@ class Passes:
         """Record the state at the end of the only pass."""
         self._keep(self._begin + self._clock.duration, len(self._biases) - 1, state)
 
-    def _run(self, state: FloatArray, begin: float, *, keep: bool) -> FloatArray:
-        system, biases, h, k = self._system, self._biases, self._clock.step, 0
+    def _run(self, state: FloatArray, begin: float, first: int = 0, *, keep: bool) -> FloatArray:
+        system, biases, h = self._system, self._biases, self._clock.step
+        k = before = first * self._clock.substeps
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges is told as such
-            for _ in range(self._clock.samples):
+            for _ in range(first, self._clock.samples):
                 if keep:
                     self._keep(begin + k * h, k, state)
                 for _ in range(self._clock.substeps):
@@ -91,7 +96,7 @@ class Passes:
                     k += 1
                     system.accept(begin + k * h, state)
                 self._check(state, begin + k * h)
-        self.steps += k
+        self.steps += k - before
         return state
 
     def _keep(self, time: float, k: int, state: FloatArray) -> None:

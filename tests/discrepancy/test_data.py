@@ -84,6 +84,7 @@ def test_a_push_of_a_few_samples_or_nearly_all_the_time_is_none(nothing_missing,
 
 
 @pytest.mark.parametrize(("compliance", "within"), [(0.0005, 0.02), (0.0025, 0.05)])
+@pytest.mark.slow
 def test_how_far_a_link_bends(laboratory, compliance, within):
     """Half of the whole compliance behind the encoder, and the spring that is found without the effect is another."""
     shape = {"compliance": compliance}

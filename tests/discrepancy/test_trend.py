@@ -143,6 +143,7 @@ def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
 
 
 @pytest.mark.parametrize("amplitude", [3.0, 6.0])
+@pytest.mark.slow
 def test_a_start_that_still_settles_is_no_trend(laboratory, amplitude):
     """The first period is pulled, strongly at first and less and less: said, and not named."""
     recording = laboratory.record(periods=8)
@@ -233,6 +234,7 @@ def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
 
 
 @pytest.mark.parametrize(("time_constant", "named"), [(4.0, False), (7.0, True)])
+@pytest.mark.slow
 def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_constant, named):
     planted = [("torque_constant_drift", "hip", [0.4], {"time_constant": time_constant})]
     bench = laboratory.bench(laboratory.record(planted, periods=10))

@@ -101,6 +101,29 @@ def test_started_in_its_own_state_a_simulation_goes_on_as_before(leg, leg_series
     assert np.array_equal(again.motion.q, exact.motion.q[: len(again.motion)])
 
 
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_what_leads_to_the_recording_is_not_recorded(leg, leg_series, quiet, exact, share):
+    samples = len(exact.motion) // exact.periods
+    first = samples - round(share * samples)
+    lead = (samples - first) * exact.period / samples
+    again = simulate(leg, leg_series, periods=1, start=exact.motion[first : first + 1], lead=lead, **quiet)
+    assert len(again.motion) == samples
+    assert again.motion.time[0] == exact.motion.time[0]
+    assert np.array_equal(again.motion.q, exact.motion.q[samples:])
+    assert np.array_equal(again.tau_motor, exact.tau_motor[samples:])
+
+
+@pytest.mark.parametrize("lead", [-1.0, 1e-4, 1e3, np.nan, np.inf])
+def test_a_lead_that_is_none_is_refused(leg, leg_series, exact, lead):
+    with pytest.raises(SimulationError, match=r"lead is .* s at most"):
+        simulate(leg, leg_series, periods=1, start=exact.motion[0:1], lead=lead)
+
+
+def test_a_lead_from_nowhere_is_refused(leg, leg_series):
+    with pytest.raises(SimulationError, match="give `start`"):
+        simulate(leg, leg_series, periods=1, lead=1.0)
+
+
 def test_controller_knows_the_description_and_not_the_plant(leg, leg_series, quiet, exact):
     truth = plant_from_robot(leg)
     heavier = truth.replace(viscous_friction=3.0 * truth.viscous_friction)
