@@ -20,17 +20,15 @@ CASES = (("spring_offset", (0.5,), {}), ("backlash", (200.0,), {"half_width": 0.
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "values", "shape"), CASES)
-def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(name, values, shape):
-    robot = sea_ident.load_robot("exo_leg")
-    good = sea_ident.design_excitation(robot, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=0).series
-    series = FourierSeries(good.base_frequency, good.offset, 0.3 * good.a, 0.3 * good.b)
+def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(leg, series, name, values, shape):
+    motion = replace(series[0], a=0.3 * series[0].a, b=0.3 * series[0].b)
     hidden = PlantedEffect(make_effect(name, "knee", **shape), np.array(values))
     verdicts = []
     for number in range(3):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeaIdentWarning)
-            recording = simulate(robot, series, periods=16, seed=1 + number, effects=[hidden]).recording
-            found = sea_ident.diagnose(sea_ident.identify(robot, recording, period=PERIOD), recording)
+            recording = simulate(leg, motion, periods=16, seed=1 + number, effects=[hidden]).recording
+            found = sea_ident.diagnose(sea_ident.identify(leg, recording, period=PERIOD), recording)
         verdicts.append(found.verdict)
         if found.next_experiment is None:
             break
@@ -38,7 +36,7 @@ def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(name, values, shape
         assert min(record["margins"].values()) >= 0.0
         assert found.next_experiment.gain > 1.1
         coefficients = (np.array(record[key]) for key in ("offset", "a", "b"))
-        series = FourierSeries(record["base_frequency"], *coefficients)
+        motion = FourierSeries(record["base_frequency"], *coefficients)
     assert verdicts[0] is Verdict.AMBIGUOUS
     assert verdicts[-1] in (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER)
     assert [(m.effect, m.joint) for m in found.missing] == [(name, "knee")]
