@@ -68,6 +68,11 @@ class Diagnosis:
     holdout_source: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def adds(self) -> bool:
+        """Whether anything is missing that was added to the model; what changed since an earlier one is in it."""
+        return bool(self.missing) and self.verdict is not Verdict.ONLY_AGAINST_REFERENCE
+
     def summary(self) -> str:
         """The paragraph, and the tables behind it."""
         lines = [f"{self.verdict}: {self.text}"]

@@ -227,3 +227,14 @@ def test_where_nothing_is_missing_no_share_of_a_gap_is_told(diagnosis, tmp_path)
     assert "of the gap closed" not in text
     assert "% of the gap is closed" not in text
     assert "nothing was added" in text
+
+
+def test_what_changed_against_a_reference_is_in_the_model_already(diagnosis, tmp_path):
+    changed = replace(diagnosis, verdict=Verdict.ONLY_AGAINST_REFERENCE, simulation_gap={})
+    path = tmp_path / "r.html"
+    write_report(changed, path)
+    text = path.read_text(encoding="utf-8")
+    assert "against the reference" in text
+    assert "effects missing" not in text
+    assert "of the gap closed" not in text
+    assert "% of the gap is closed" not in text

@@ -28,16 +28,12 @@ class GapSection(DiagnosisSection):
             ("data that were held out", diagnosis.holdout),
         ):
             if gap is not None:
-                groups.append(
-                    (_bars(gap, f"On {label}", torque_unit(diagnosis.units)), _closed(gap, bool(diagnosis.missing)))
-                )
+                groups.append((_bars(gap, f"On {label}", torque_unit(diagnosis.units)), _closed(gap, diagnosis.adds)))
         for signal, gap in diagnosis.simulation_gap.items():
             unit, scale = torque_unit(diagnosis.units), 1.0
             if signal in POSITIONS:
                 unit, scale = " or ".join(f"m{part}" for part in position_unit(diagnosis.units).split(" or ")), 1e3
-            groups.append(
-                (_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap, bool(diagnosis.missing)))
-            )
+            groups.append((_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap, diagnosis.adds)))
         if not groups:
             return None
         return {
@@ -52,7 +48,7 @@ def _closed(gap: Gap, added: bool) -> str:
     if not any(value > 0.0 for value in gap.before.values()):
         return "The model was within the noise before already."
     if not added:
-        return "No effect is named, so nothing was added."
+        return "No effect is named that the model lacks, so nothing was added."
     if gap.shrink < 0.0:
         return f"The gap is {-100.0 * gap.shrink:.0f} % larger."
     return f"{100.0 * gap.shrink:.0f} % of the gap is closed."

@@ -30,11 +30,14 @@ class VerdictSection(DiagnosisSection):
         """Sentence, tiles and table."""
         level, meaning = MEANING[diagnosis.verdict]
         lack = diagnosis.lack_of_fit
-        tiles = [(str(len(diagnosis.missing)), "effect missing" if len(diagnosis.missing) == 1 else "effects missing")]
+        one, several = ("effect missing", "effects missing")
+        if diagnosis.verdict is Verdict.ONLY_AGAINST_REFERENCE:
+            one, several = ("change against the reference", "changes against the reference")
+        tiles = [(str(len(diagnosis.missing)), one if len(diagnosis.missing) == 1 else several)]
         for label, gap in (("the recording", diagnosis.training), ("held-out data", diagnosis.holdout)):
-            if diagnosis.missing and gap is not None and any(value > 0.0 for value in gap.before.values()):
+            if diagnosis.adds and gap is not None and any(value > 0.0 for value in gap.before.values()):
                 tiles.append((f"{100 * gap.shrink:.0f} %", f"of the gap closed on {label}"))
-        if diagnosis.missing and "q" in diagnosis.simulation_gap:
+        if diagnosis.adds and "q" in diagnosis.simulation_gap:
             shrink = diagnosis.simulation_gap["q"].shrink
             tiles.append((f"{100 * shrink:.0f} %", "of the gap closed in forward simulation of q"))
         equations = list(dict.fromkeys(name for parts in lack.per_joint.values() for name in parts))
