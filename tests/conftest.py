@@ -13,6 +13,15 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 
+LONG = ("test_readme.py", "test_cli.py", "test_cli_excite.py", "test_distributed.py", "test_demo.py")
+"""Files that go first: one that takes long and comes last leaves all processes but its own without work."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long files first, the others as they are."""
+    items.sort(key=lambda item: item.path.name not in LONG)
+
+
 @dataclass(frozen=True)
 class Answer:
     """What a command line said, and how it ended."""

@@ -48,7 +48,6 @@ SAME_TORQUE = [
 ]
 
 
-@pytest.mark.slow
 def test_a_kink_never_passed_is_declared_beside_an_offset_and_play_before_a_stiffening_spring_is_not(
     preloaded,
 ):

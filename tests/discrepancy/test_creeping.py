@@ -135,7 +135,6 @@ def test_where_it_can_be(nothing_missing):
         Creep("knee").torque(bench.robot, np.ones(1))
 
 
-@pytest.mark.slow
 def test_creep_is_no_hysteresis(laboratory, leg):
     stiffness = 0.3 * leg.spring("knee").stiffness
     bench = laboratory.bench(laboratory.record([(PlantedCreep("knee", 0.25), [stiffness])], periods=10, step=STEP))
@@ -169,7 +168,6 @@ def test_hysteresis_is_no_creep_whatever_else_is_missing(laboratory, beside):
     assert unnamed(bench, selection, None) == ()
 
 
-@pytest.mark.slow
 def test_dry_friction_that_hardly_slips_is_no_creep(laboratory):
     """It is less like the form of the library than like creep, and most like dry friction that is wider."""
     bench = laboratory.bench(laboratory.record([(PlantedBoucWen("ankle"), [2.0])], periods=6))

@@ -46,7 +46,6 @@ def test_bad_encoders_do_not_blur_the_sign_of_a_velocity(laboratory):
 
 
 @pytest.mark.parametrize(("joint", "sine", "cosine"), [("ankle", -0.0354, -0.0294), ("knee", 0.05, 0.05)])
-@pytest.mark.slow
 def test_a_large_error_of_an_encoder_does_not_cost_the_spring(laboratory, joint, sine, cosine):
     """Its tangent is wrong by a factor of two to four, and a spring without stiffness would explain as much."""
     shape = {"sine": sine, "cosine": cosine}
@@ -84,7 +83,6 @@ def test_a_push_of_a_few_samples_or_nearly_all_the_time_is_none(nothing_missing,
 
 
 @pytest.mark.parametrize(("compliance", "within"), [(0.0005, 0.02), (0.0025, 0.05)])
-@pytest.mark.slow
 def test_how_far_a_link_bends(laboratory, compliance, within):
     """Half of the whole compliance behind the encoder, and the spring that is found without the effect is another."""
     shape = {"compliance": compliance}

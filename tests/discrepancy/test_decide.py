@@ -88,7 +88,6 @@ def test_what_holds_there_as_well_stays_possible(rivals):
     assert (name, left) == ("spring_offset", ["spring_offset"])
 
 
-@pytest.mark.slow
 def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_turned_out_to_be(laboratory):
     """Both effects are named wrongly, and both alternatives are right: neither is judged beside the other's error."""
     planted = [("spring_offset", JOINT, [0.5], {}), ("load_dependent_friction", "hip", [0.1], {})]

@@ -43,7 +43,6 @@ def recorded_as(laboratory, robot, effect, joint, shape):
 
 
 @pytest.mark.parametrize("effect", list(LARGE))
-@pytest.mark.slow
 def test_amounts_begin_right_with_springs_that_are_described_wrong(laboratory, softer, effect):
     bench = recorded_as(laboratory, softer, effect, "ankle", LARGE[effect])
     begun = begin_as_described(bench, bench.effects, make_effect(effect, "ankle"), ())
@@ -53,7 +52,6 @@ def test_amounts_begin_right_with_springs_that_are_described_wrong(laboratory, s
 
 
 @pytest.mark.parametrize(("effect", "joint"), [("encoder_eccentricity", "ankle"), ("encoder_offset", "hip")])
-@pytest.mark.slow
 def test_a_large_error_of_an_encoder_is_found(laboratory, effect, joint):
     bench = laboratory.bench(laboratory.record([(effect, joint, [], LARGE[effect])], periods=6))
     found = search(bench, bench.effects)

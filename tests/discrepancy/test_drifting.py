@@ -53,7 +53,6 @@ def test_a_torque_constant_that_drifts_is_no_friction_that_does(laboratory, with
         (("torque_constant_drift", "knee", [-0.4], {}), ("torque_constant", "knee")),
     ],
 )
-@pytest.mark.slow
 def test_a_drift_of_the_library_keeps_its_name_beside_what_was_found(laboratory, drift, found):
     planted = [drift, (*found, [0.05], {})]
     bench, _, now, trends = compared(laboratory, planted, found)

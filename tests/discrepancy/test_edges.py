@@ -59,7 +59,6 @@ def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
     assert found.effects[-1].stop == pytest.approx(STOP, abs=1.01 * sample)
 
 
-@pytest.mark.slow
 def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
     """Of what turns the link only the moment about the axis of the joints shows."""
     force, point = np.array([4.0, 0.0, 2.0]), {"point_x": 0.05, "point_z": -0.08}
@@ -113,7 +112,6 @@ def pushed_thigh(laboratory):
     return bench, now, Settled(shank, noise), candidates
 
 
-@pytest.mark.slow
 def test_a_push_on_another_link_is_compared_when_its_edges_are_known(pushed_thigh):
     """A window that is a little off leaves of a large push many times what either link leaves in the end."""
     bench, now, shank, candidates = pushed_thigh

@@ -38,7 +38,6 @@ def test_a_soft_stop_is_no_push(laboratory, nothing_missing, top, exponent):
     assert " rad, as a soft stop there does" in one.sentence
 
 
-@pytest.mark.slow
 def test_a_push_while_a_joint_is_at_the_end_of_its_path_is_one(laboratory, nothing_missing):
     motion = nothing_missing[0].data.motion
     there = float(motion.time[np.argmax(motion.q[:, 1])])

@@ -109,7 +109,6 @@ def test_pushed_is_the_push_and_its_margin_at_its_joint():
 
 
 @pytest.mark.parametrize(("periods", "seed"), [(4, 1), (6, 6), (9, 9)])
-@pytest.mark.slow
 def test_friction_that_differs_from_pass_to_pass_is_no_push(laboratory, periods, seed):
     recording = laboratory.record(periods=periods, seed=seed)
     with warnings.catch_warnings():

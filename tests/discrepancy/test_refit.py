@@ -88,7 +88,6 @@ def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(labor
     assert found.effects[-1].half_width == pytest.approx(width, rel=0.1)
 
 
-@pytest.mark.slow
 def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing):
     """Where the motion does not pass the play its softness is all that tells it from a constant."""
     bench, _ = nothing_missing

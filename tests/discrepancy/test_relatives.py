@@ -160,7 +160,6 @@ def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
         ),
     ],
 )  # fmt: skip
-@pytest.mark.slow
 def test_an_encoder_that_errs_and_a_ripple_are_a_torque_on_the_link(laboratory, planted, said):
     bench = laboratory.bench(laboratory.record(planted))
     order = 9.0 if not said else 1.0

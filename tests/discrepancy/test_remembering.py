@@ -70,7 +70,6 @@ def test_a_library_without_dry_friction_in_springs_names_none(laboratory, offset
 
 
 @pytest.mark.parametrize("amounts", [[1.0, 3.0], [2.0, 1.0]])
-@pytest.mark.slow
 def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laboratory, amounts):
     """The constant is the same on both, and what tells is left on the other motion while it slips."""
     slip = 0.0114
@@ -94,7 +93,6 @@ def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laborato
     assert held.transfers[0].excess < 0.1 * before.excess
 
 
-@pytest.mark.slow
 def test_what_else_is_missing_on_the_other_motion_is_no_reason_for_such_an_element(laboratory, offset):
     """The constant is the same there, and hardly anything of what is left would be explained."""
     bench, selection = offset

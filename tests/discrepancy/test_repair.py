@@ -83,7 +83,6 @@ def test_what_drifts_is_named_and_is_no_part_of_the_model(leg, series):
     assert "friction_drift" not in [effect.name for effect in found.model.effects]
 
 
-@pytest.mark.slow
 def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(leg, series):
     effect, _ = KINDS["link"]
     recording = simulate(leg, series[0], periods=12, seed=70, effects=[effect]).recording

@@ -67,7 +67,6 @@ def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_mis
 
 
 @pytest.mark.parametrize(("planted", "said"), [("position_delay", 1), ("link_friction", 0)])
-@pytest.mark.slow
 def test_a_late_encoder_is_no_friction_of_the_link(laboratory, planted, said):
     """It looks viscous, but for the inertia that comes late too."""
     how = {"position_delay": ((), {"delay": 0.004}), "link_friction": ((0.25, 0.15), {})}[planted]

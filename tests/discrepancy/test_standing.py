@@ -1,13 +1,11 @@
 """Where a motor stands: what stays uncompared beside a reversal."""
 
 import numpy as np
-import pytest
 
 from sea_ident.discrepancy.data import EquationKind
 from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals, longest_standing
 
 
-@pytest.mark.slow
 def test_what_stands_stays_out_and_what_is_only_slow_is_compared(jittery):
     data = jittery
     near = compared_beside_reversals(data)

@@ -1,7 +1,5 @@
 """Whether an effect holds on another motion: what it is worth there, and what is not its own fault."""
 
-import pytest
-
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
@@ -10,7 +8,6 @@ from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
 
-@pytest.mark.slow
 def test_what_others_gain_by_a_refit_does_not_count_against_what_another_motion_hardly_shows(laboratory):
     """The ripple of the hip is larger there; that of the ankle counts where it is large enough to be seen."""
     used, unseen, seen = (
@@ -51,7 +48,6 @@ def transfers_of(laboratory, used, there, **options):
     return transfer(other, selection, settle_again(other, other.predicted(fit.effects, fit.parameters)))
 
 
-@pytest.mark.slow
 def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
     """The ripple of the knee is far larger on the other motion: that of the hip is what it was."""
     hip, knee = transfers_of(laboratory, ripples(0.4, 1.0), ripples(0.4, 4.5))
@@ -61,7 +57,6 @@ def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
     assert not knee.holds
 
 
-@pytest.mark.slow
 def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect(laboratory):
     hip, knee = transfers_of(
         laboratory,

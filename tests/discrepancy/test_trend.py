@@ -47,7 +47,6 @@ def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
     }
 
 
-@pytest.mark.slow
 def test_a_third_drift_has_a_name_too(laboratory):
     planted = [
         ("stiffness_drift", "ankle", [-20.0], {}),
@@ -84,7 +83,6 @@ def test_a_spring_that_warms_up_has_its_first_rate_and_its_time_constant(laborat
     assert abs(trend.effect.time_constant - 20.0) < 3.0 * trend.time_constant_std < 5.0
 
 
-@pytest.mark.slow
 def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     """Half of it within two minutes: the torque that the record shows is another share of every other one."""
     bench = laboratory.bench(laboratory.record([("torque_constant_drift", "knee", [-0.25], {})], periods=16))
@@ -94,7 +92,6 @@ def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     assert abs(trend.values[0] + 0.25) < 3.0 * trend.stds[0] < 0.06
 
 
-@pytest.mark.slow
 def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(laboratory):
     recording = laboratory.record([("temperature_friction", "knee", [0.0, -0.05], {"time_constant": 24.0})], periods=12)
     whole = laboratory.data(recording)
@@ -110,7 +107,6 @@ def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(l
     assert cos2 > 0.95
 
 
-@pytest.mark.slow
 def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch):
     """It rises for half of the recording and falls again: no course in time does that."""
 
@@ -143,7 +139,6 @@ def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
 
 
 @pytest.mark.parametrize("amplitude", [3.0, 6.0])
-@pytest.mark.slow
 def test_a_start_that_still_settles_is_no_trend(laboratory, amplitude):
     """The first period is pulled, strongly at first and less and less: said, and not named."""
     recording = laboratory.record(periods=8)
@@ -234,7 +229,6 @@ def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
 
 
 @pytest.mark.parametrize(("time_constant", "named"), [(4.0, False), (7.0, True)])
-@pytest.mark.slow
 def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_constant, named):
     planted = [("torque_constant_drift", "hip", [0.4], {"time_constant": time_constant})]
     bench = laboratory.bench(laboratory.record(planted, periods=10))

@@ -84,7 +84,6 @@ def test_ambiguous_with_the_experiment_that_tells(leg, series):
     assert pickle.loads(pickle.dumps(found)).text == found.text
 
 
-@pytest.mark.slow
 def test_not_in_the_library_though_something_much_like_it_is(model, intact):
     """A ripple that grows with the load: one that does not is found, and what explains the recording better is said."""
     theta, motor = intact.columns["theta_knee"], model.robot.joints[1].actuator

@@ -42,7 +42,6 @@ def named(selection):
     return [(effect.name, effect.joint) for effect in selection.effects]
 
 
-@pytest.mark.slow
 def test_the_search_without_the_slow_samples_finds_what_they_hide(lingering):
     leg = lingering.robot
     bench = Bench(lingering, (*base_effects(leg), *spring_effects(leg)))
@@ -59,7 +58,6 @@ def test_the_search_without_the_slow_samples_finds_what_they_hide(lingering):
     assert second.bench.data.left_out[:, 0].mean() > bench.data.left_out[:, 0].mean()
 
 
-@pytest.mark.slow
 def test_more_caution_leaves_out_more_and_nothing_else(lingering):
     far = away_from_reversals(lingering, 6)
     assert np.all(far.left_out >= lingering.left_out)
