@@ -52,13 +52,11 @@ def without_reference(recording):
     return type(recording)(recording.time, columns, recording.source)
 
 
-@pytest.mark.slow
 def test_both_are_added_and_nothing_is_left(closed):
     assert closed.verdict == "none"
     assert set(closed.added) == {("spring_offset", "knee"), ("torque_ripple", "hip")}
 
 
-@pytest.mark.slow
 def test_the_history_shows_the_gap_shrink_in_torque_and_in_simulation(closed):
     first, last = closed.history[0], closed.history[-1]
     assert first.torque_held_out[1] < 0.15 * first.torque_held_out[0]
@@ -68,7 +66,6 @@ def test_the_history_shows_the_gap_shrink_in_torque_and_in_simulation(closed):
     assert "simulated q" in closed.summary()
 
 
-@pytest.mark.slow
 def test_what_cancels_in_the_motor_torque_is_kept(closed):
     spring = next(s for s in closed.model.springs if s.joint == "knee")
     value, std = spring.terms[0].values[0], spring.terms[0].stds[0]
@@ -76,7 +73,6 @@ def test_what_cancels_in_the_motor_torque_is_kept(closed):
     assert abs(value - 1.0) < 5.0 * std
 
 
-@pytest.mark.slow
 def test_saved_read_back_and_diagnosed_again_nothing_is_missing(closed, recordings, tmp_path):
     closed.model.save(tmp_path / "m.json")
     again = read_model(tmp_path / "m.json")

@@ -213,7 +213,6 @@ def test_size_of_the_lack_of_fit_of_four_periods(laboratory):
     assert np.sum(rejected) <= 8
 
 
-@pytest.mark.slow
 def test_a_leg_that_lacks_nothing_leaves_its_noise(laboratory, nothing_missing):
     """Statistic over degrees of freedom near one, in all and for every equation, whatever the noise."""
     found = [nothing_missing]

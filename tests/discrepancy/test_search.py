@@ -229,7 +229,6 @@ def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
     assert ("spring_stiffening", "knee") not in {(c.effect.name, c.effect.joint) for c in scan(bench, fit, start.noise)}
 
 
-@pytest.mark.slow
 def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(laboratory):
     """At certain times of a period a form that is not the right one leaves something too, and a push fits there."""
     push = make_effect("external_force", "ankle", start=0.4, stop=0.9)

@@ -126,7 +126,6 @@ def test_progress_rises_within_every_start(exo):
     assert seen[-1].best == max(state.value for state in seen if state.step >= seen[-1].step - 100)
 
 
-@pytest.mark.slow
 def test_every_criterion_is_best_in_its_own_sense(exo):
     """From no seed is a design worse, by its own criterion, than the D-optimal one; on average none is better.
 
