@@ -16,14 +16,7 @@ from tests.benchmarks.hidden_effects.diagnose_case import without_effects
 from tests.benchmarks.hidden_effects.draw import draw_case
 from tests.benchmarks.hidden_effects.generate import case_folder, generate, truth_file
 from tests.benchmarks.hidden_effects.scoring import Score, score_case
-from tests.benchmarks.hidden_effects.table import (
-    EASILY_TAKEN_FOR,
-    alias_clusters,
-    either_way,
-    lines_of,
-    wilson,
-    write_report,
-)
+from tests.benchmarks.hidden_effects.table import EASILY_TAKEN_FOR, either_way, lines_of, wilson, write_report
 
 RIPPLE = Planted("torque_ripple", "knee", "library", 0.1, {"order": 5.0, "phase": 0.3}, gap=0.02, torque_share=0.02)
 
@@ -77,16 +70,6 @@ def test_two_effects_of_equal_data_count_as_one_at_the_last_joint_only(tmp_path:
         planted = replace(RIPPLE, effect="spring_offset", joint=joint)
         score = scored(tmp_path, (planted,), said(("encoder_offset", joint)))
         assert (score.finder(planted) is not None) is equal
-
-
-def test_whatever_is_declared_beside_an_effect_is_easily_taken_for_it(tmp_path: Path) -> None:
-    play = replace(RIPPLE, effect="backlash")
-    told = said(("encoder_offset", "knee"), alternatives=(("backlash", "knee"), ("spring_offset", "knee")))
-    assert "encoder_offset" not in alias_clusters([])["backlash"]
-    assert {"encoder_offset", "spring_offset"} <= alias_clusters([scored(tmp_path, (play,), told)])["backlash"]
-    # a name that is merely wrong is no such set
-    wrong = scored(tmp_path, (play,), said(("torque_ripple", "knee")))
-    assert "torque_ripple" not in alias_clusters([wrong])["backlash"]
 
 
 def test_nothing_missing_and_failed_diagnoses(tmp_path: Path) -> None:

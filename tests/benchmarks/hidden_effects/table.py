@@ -230,10 +230,9 @@ def alias_clusters(cases: list[Score]) -> dict[str, set[str]]:
     """Names that each effect can be taken for: by its nature, and by what diagnoses with the whole library declared."""
     clusters = either_way(EASILY_TAKEN_FOR)
     for score in cases:
-        # whichever of a declared set comes first: it is one of those that the data do not tell apart
-        found = score.coverer(score.main)
+        found = score.finder(score.main)
         if found is not None:
-            clusters.setdefault(score.main.effect, set()).update(name for name, _ in found.declared)
+            clusters.setdefault(score.main.effect, set()).update(name for name, _ in found.alternatives)
     return clusters
 
 
