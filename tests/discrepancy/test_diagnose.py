@@ -10,36 +10,22 @@ from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.simulation import PlantedEffect, simulate
 
-# whether a friction at the knee moves the ankle beyond its noise is a matter of the motion that was designed
-pytestmark = pytest.mark.filterwarnings("ignore:forward simulation of q at:sea_ident.exceptions.SeaIdentWarning")
 
-
-@pytest.fixture(scope="module")
-def leg():
-    return sea_ident.load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
-def excitations(leg):
-    return [sea_ident.design_excitation(leg, base_frequency=0.2, harmonics=5, starts=1, seed=seed) for seed in (0, 1)]
-
-
-def recorded(leg, excitations, planted, seed):
+def recorded(leg, series, planted, seed):
     return [
-        simulate(leg, excitation, periods=12, seed=seed + k, effects=planted).recording
-        for k, excitation in enumerate(excitations)
+        simulate(leg, motion, periods=12, seed=seed + k, effects=planted).recording for k, motion in enumerate(series)
     ]
 
 
 @pytest.fixture(scope="module")
-def intact(leg, excitations):
-    return recorded(leg, excitations, (), 100)
+def intact(leg, series):
+    return recorded(leg, series, (), 100)
 
 
 @pytest.fixture(scope="module")
-def stribeck(leg, excitations):
+def stribeck(leg, series):
     effect = make_effect("stribeck_friction", "knee", speed=0.1)
-    return recorded(leg, excitations, (PlantedEffect(effect, np.array([1.0])),), 200)
+    return recorded(leg, series, (PlantedEffect(effect, np.array([1.0])),), 200)
 
 
 @pytest.fixture(scope="module")
