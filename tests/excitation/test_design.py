@@ -127,25 +127,25 @@ def test_progress_rises_within_every_start(exo):
 
 
 def test_every_criterion_is_best_in_its_own_sense(exo):
-    """From no seed is a design worse, by its own criterion, than the D-optimal one; on average none is better.
+    """From no seed is a design worse, by its own criterion, than the D-optimal one; on average it is the best of all.
 
-    The optima are local, and which one a climb ends in is a matter of rounding, so that a design of a third criterion
-    may be the better one by what local optima scatter.
+    The optima are local, and which one a climb ends in is a matter of rounding: of one start or two from one seed a
+    design of a third criterion may be the better one.
     """
     criteria = [DOptimality(), AOptimality(), EOptimality(), ConditionNumber()]
     model, _ = design_model(exo, reduced_effects(exo), DOptimality(), None)
     table = np.zeros((4, 4, 4))  # seed, criterion that judges, criterion of the design
     for seed in range(4):
         for k, designed_for in enumerate(criteria):
-            found = design_excitation(exo, seed=seed, criterion=designed_for, **SMALL)
+            found = design_excitation(exo, seed=seed, criterion=designed_for, **{**SMALL, "starts": 6})
             rows = model.columns.at(found.series.sample(50.0)).columns()
             matrix = np.einsum("rpn,rsn->ps", rows, rows)
             table[seed, :, k] = [criterion.reported(matrix) for criterion in criteria]
             assert found.value == pytest.approx(table[seed, k, k], rel=1e-9)
     for k, criterion in enumerate(criteria[1:], 1):
         assert np.all(table[:, k, k] >= table[:, k, 0] - 1e-9), (criterion.name, table[:, k])
-    mean, scatter = table.mean(axis=0), table.std(axis=0, ddof=1) / np.sqrt(len(table))
-    assert np.all(np.diag(mean) >= mean.max(axis=1) - np.diag(scatter)), (mean, scatter)
+    mean = table.mean(axis=0)
+    np.testing.assert_array_equal(np.argmax(mean, axis=1), np.arange(4))
 
 
 def test_what_is_raised_is_told_and_an_interrupted_design_is_of_its_criterion(exo):
