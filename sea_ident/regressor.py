@@ -57,7 +57,10 @@ def model_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, ...]
     columns = tuple(column for effect in effects for column in effect.columns(robot))
     twice = sorted(name for name, count in Counter(column.name for column in columns).items() if count > 1)
     if twice:
-        raise SeaIdentError(f"the effects give two columns the same name: {', '.join(twice)}; leave one out")
+        raise SeaIdentError(
+            f"the effects give two columns the same name: {', '.join(twice)}; leave one out, or number them where the "
+            "effect has a number, as torque_ripple does (number=2)"
+        )
     return columns
 
 

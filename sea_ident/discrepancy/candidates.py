@@ -95,13 +95,27 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
         if name in ONLY_AGAINST_REFERENCE or issubclass(kind, TrendEffect):
             continue
         for place in kind.instances(bench.robot):
-            effect = place.beside() if effect_key(place) in present else place
-            if effect is None:
-                continue
-            if {column.name for column in effect.columns(bench.robot)} & present_columns:
-                continue
-            found.append(effect)
+            effect = _absent(bench, place, effect_key(place) in present, present_columns)
+            if effect is not None:
+                found.append(effect)
     return tuple(found)
+
+
+def _absent(bench: Bench, place: Effect, taken: bool, present_columns: set[str]) -> Effect | None:
+    """The effect, or where its place is taken the form of it that can stand beside what is there; None where none can.
+
+    Args:
+        bench: the recording.
+        place: the effect.
+        taken: whether the model has it in one form or other.
+        present_columns: names of the parameters of the model.
+    """
+    effect: Effect | None = place
+    if taken and place.beside() is None:
+        return None
+    while effect is not None and {column.name for column in effect.columns(bench.robot)} & present_columns:
+        effect = effect.beside()
+    return effect
 
 
 def scan(

@@ -140,7 +140,7 @@ def close_gap(
     if rounds < 1:
         raise DiagnosisError(f"rounds is {rounds}; at least one diagnosis is needed")
     history: list[Diagnosis] = []
-    known: set[tuple[str, str | None]] = set()
+    known: set[str] = set()
     notes: list[str] = []
     for number in range(rounds):
         tell = None if progress is None else _share(progress, number, rounds)
@@ -149,14 +149,13 @@ def close_gap(
         )
         history.append(diagnosis)
         notes.extend(text for text in diagnosis.warnings if text not in notes)
-        found = {(m.effect, m.joint) for m in diagnosis.missing}
+        found = {m.title for m in diagnosis.missing}
         if diagnosis.verdict not in NAMED or diagnosis.model is None or found <= known:
             break
         known |= found
         model = diagnosis.model
-        kept = {(effect.name, effect.joint) for effect in (*model.effects, *model.spring_effects)}
-        if not found & kept:
-            names = ", ".join(sorted(effect if joint is None else f"{effect} at {joint}" for effect, joint in found))
+        if not found & {effect.title for effect in (*model.effects, *model.spring_effects)}:
+            names = ", ".join(sorted(found))
             notes.append(f"{names}: named, but a model of one moment has no place for what changes in the recording")
             break
     else:

@@ -353,9 +353,8 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
     first = len(after.effects) - selection.added
     for position in range(first, len(after.effects)):
         effect = after.effects[position]
-        label = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
-        explained[label] = waveform(contribution(bench, after, [position]), data.samples)
-        bands[label] = torque_std(bench, after, position)
+        explained[effect.title] = waveform(contribution(bench, after, [position]), data.samples)
+        bands[effect.title] = torque_std(bench, after, position)
     return Waveforms(
         time=data.motion.time - data.motion.time[0],
         equations=labels,

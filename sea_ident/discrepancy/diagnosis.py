@@ -78,8 +78,7 @@ class Diagnosis:
         lines = [f"{self.verdict}: {self.text}"]
         kind = "perhaps" if self.verdict is Verdict.CANNOT_TELL else "missing"
         for m in self.missing:
-            where = f" at {m.joint}" if m.joint else ""
-            lines.append(f"  {kind}: {m.effect}{where}, {m.extent}, p {chance(m.p_value)}")
+            lines.append(f"  {kind}: {m.title}, {m.extent}, p {chance(m.p_value)}")
             lines.extend(f"    {p}" for p in m.parameters)
             if m.alternatives:
                 others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)

@@ -149,6 +149,13 @@ class MissingEffect:
     values: tuple[float, ...] = ()
 
     @property
+    def title(self) -> str:
+        """Name and joint; with what tells it from another of its kind at the joint."""
+        if self.detail is not None:
+            return self.detail.title
+        return self.effect if self.joint is None else f"{self.effect} at {self.joint}"
+
+    @property
     def extent(self) -> str:
         """How much there is of it: its amounts where it acts on what is measured, the torque of all others."""
         if isinstance(self.detail, SignalEffect) and self.parameters:

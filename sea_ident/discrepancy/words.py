@@ -199,10 +199,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
-def _name(m: MissingEffect) -> str:
-    return m.effect if m.joint is None else f"{m.effect} at {m.joint}"
-
-
 def _part(facts: Facts) -> float | None:
     """Share of what the only effect could explain of other data that it does, where it holds in part there [-]."""
     shares = [m.transfer for m in facts.missing]
@@ -211,7 +207,7 @@ def _part(facts: Facts) -> float | None:
 
 
 def _opening(facts: Facts) -> str:
-    names = ", ".join(f"{_name(m)} ({m.extent})" for m in facts.missing)
+    names = ", ".join(f"{m.title} ({m.extent})" for m in facts.missing)
     match facts.verdict:
         case Verdict.NONE:
             return (
@@ -226,7 +222,7 @@ def _opening(facts: Facts) -> str:
             return f"The model lacks {names}."
         case Verdict.AMBIGUOUS:
             alike = "; nor ".join(
-                f"{', '.join([_name(m), *(f'{a.effect} at {a.joint}' for a in m.alternatives[:-1])])} from "
+                f"{', '.join([m.title, *(f'{a.effect} at {a.joint}' for a in m.alternatives[:-1])])} from "
                 f"{m.alternatives[-1].effect} at {m.alternatives[-1].joint}"
                 for m in facts.missing
                 if m.alternatives
@@ -246,7 +242,7 @@ def _opening(facts: Facts) -> str:
         case Verdict.ONLY_AGAINST_REFERENCE:
             if not facts.missing:
                 return "The model fits, but its parameters are not those of the reference, in a way that has no name."
-            changed = "; ".join(f"{_name(m)}, {m.parameters[0]} ({m.extent})" for m in facts.missing)
+            changed = "; ".join(f"{m.title}, {m.parameters[0]} ({m.extent})" for m in facts.missing)
             return f"The model fits, but its parameters are not those of the reference. What changed: {changed}."
         case _ if not facts.sound:
             return "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."

@@ -304,7 +304,10 @@ class Effect(ABC):
         )
 
     def beside(self) -> Self | None:
-        """The same effect in another form, which can stand in a model beside this one; by default there is none."""
+        """The same effect in another form, which can stand in a model beside this one; by default there is none.
+
+        The names of its parameters and its title are others, or it is not tried where this one is there.
+        """
         return None
 
     def anchored(self, anchor: Anchor) -> Self:
@@ -335,6 +338,11 @@ class Effect(ABC):
         """`<joint>.<effect>` or `<joint>.<effect>_<label>`."""
         stem = f"{self.joint}.{self.name}" if self.joint is not None else f"robot.{self.name}"
         return stem if label is None else f"{stem}_{label}"
+
+    @property
+    def title(self) -> str:
+        """Name and joint, for people, and what tells it from another of its kind there."""
+        return self.name if self.joint is None else f"{self.name} at {self.joint}"
 
     @property
     def shape_values(self) -> dict[str, float]:

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import sea_ident
+from sea_ident.discrepancy import close
 from sea_ident.discrepancy.data import wide_processing
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import LackOfFit, MissingEffect, Verdict
 from sea_ident.discrepancy.forward import command_of, simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, read_model
@@ -14,6 +17,7 @@ from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.simulation import PlantedEffect, VelocityController, simulate
 
 PERIOD = 5.0
+NOTHING_LACKS = LackOfFit(0.0, 1, 1.0, 1.0, {})
 # a model that lacks the ripple says that it lacks something
 pytestmark = pytest.mark.filterwarnings("ignore:the residual of the mean:sea_ident.exceptions.SeaIdentWarning")
 
@@ -111,3 +115,23 @@ def test_a_model_that_cannot_be_simulated_gives_no_gap_but_the_reason(leg, model
     found = simulation_gap(broken, models[1], recordings[1], wide_processing(recordings[1], leg, PERIOD))
     assert found.gaps == {}
     assert "no forward simulation of the model before the repair" in found.notes[-1]
+
+
+def test_a_second_one_of_a_kind_at_a_joint_is_added_too(models, recordings, monkeypatch):
+    """As any effect: what the first diagnosis leaves of another order, the second one names."""
+    ripples = [make_effect("torque_ripple", "hip", order=order, number=k) for k, order in ((1, 4.0), (2, 12.0))]
+    rounds = iter([*ripples, None])
+
+    def diagnosed(model, recording, **options):
+        ripple = next(rounds)
+        if ripple is None:
+            return Diagnosis(Verdict.NONE, "", NOTHING_LACKS, model=model)
+        missing = (MissingEffect("torque_ripple", "hip", (), 0.1, 1e-9, (), detail=ripple),)
+        repaired = replace(model, effects=(*model.effects, ripple))
+        return Diagnosis(Verdict.NAMED, "", NOTHING_LACKS, missing=missing, model=repaired)
+
+    monkeypatch.setattr(close, "diagnose", diagnosed)
+    closed = sea_ident.close_gap(models[0], recordings[0])
+    assert closed.verdict == "none"
+    assert [e.title for e in closed.model.effects][-2:] == ["torque_ripple at hip", "torque_ripple 2 at hip"]
+    assert not closed.warnings

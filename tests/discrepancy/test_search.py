@@ -229,6 +229,26 @@ def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
     assert ("spring_stiffening", "knee") not in {(c.effect.name, c.effect.joint) for c in scan(bench, fit, start.noise)}
 
 
+def test_two_orders_at_one_joint_are_found_within_their_uncertainties(laboratory):
+    planted = [
+        ("torque_ripple", "hip", [0.8, 0.5], {"order": 12.0}),
+        ("torque_ripple", "hip", [0.3, 0.4], {"order": 36.0}),
+    ]
+    bench = laboratory.bench(laboratory.record(planted))
+    found = search(bench, bench.effects)
+    fit = found.final.fit
+    assert [effect.title for effect in found.effects] == ["torque_ripple at hip", "torque_ripple 2 at hip"]
+    free = {(len(fit.effects) - 2 + k, "order"): truth for k, truth in enumerate((12.0, 36.0))}
+    for k, (position, shape) in enumerate(fit.free_shapes):
+        truth = free.pop((position, shape.name), None)
+        if truth is not None:
+            std = fit.std(len(fit.columns) + k) * truth
+            assert std < 0.05 * truth
+            assert abs(fit.effects[position].order - truth) < 4.0 * std
+    assert not free
+    assert lack_of_fit(bench, found.final)[2] > 1e-3
+
+
 def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(laboratory):
     """At certain times of a period a form that is not the right one leaves something too, and a push fits there."""
     push = make_effect("external_force", "ankle", start=0.4, stop=0.9)

@@ -21,6 +21,7 @@ from sea_ident.discrepancy.findings import (
     Verdict,
     Waveforms,
 )
+from sea_ident.effects import make_effect
 from sea_ident.report import write_report
 from sea_ident.report.bars import bars
 from sea_ident.report.chart import Band, Line
@@ -191,6 +192,20 @@ def test_what_depends_on_more_than_one_quantity_is_a_curve_over_time_with_its_ba
     (around,) = (mark for mark in chart.marks if isinstance(mark, Band))
     np.testing.assert_allclose(line.y, both[:, 2])
     np.testing.assert_allclose(around.upper - around.lower, 4.0 * 0.05)
+
+
+def test_two_of_a_kind_at_one_joint_have_a_curve_each_under_a_heading_of_their_own(diagnosis, tmp_path):
+    waves, ripples = diagnosis.waveforms, [make_effect("torque_ripple", "knee", number=number) for number in (1, 2)]
+    explained = {ripple.title: np.zeros((400, 6)) for ripple in ripples}
+    for size, values in zip((1.0, 3.0), explained.values(), strict=True):
+        values[:, 2] = size * np.sin(4.0 * waves.q[:, 1])
+    missing = tuple(MissingEffect("torque_ripple", "knee", (), 0.1, 1e-9, (), detail=ripple) for ripple in ripples)
+    found = replace(diagnosis, missing=missing, waveforms=replace(waves, explained=explained))
+    sizes = [np.abs(curve(each, found.waveforms, {}).marks[-1].y).max() for each in missing]
+    assert sizes[1] / sizes[0] == pytest.approx(3.0)
+    page = page_of(found, tmp_path)
+    for heading in ("torque ripple at the knee", "torque ripple 2 at the knee"):
+        assert heading in page
 
 
 def test_a_sliding_joint_has_its_own_units(diagnosis, tmp_path):

@@ -34,10 +34,10 @@ class Missing(DiagnosisSection):
         blocks = []
         for effect in diagnosis.missing:
             chart = None if diagnosis.waveforms is None else curve(effect, diagnosis.waveforms, diagnosis.units)
-            where = f" at the {effect.joint}" if effect.joint else ""
+            name, _, joint = effect.title.partition(" at ")
             blocks.append(
                 {
-                    "name": effect.effect.replace("_", " ") + where,
+                    "name": name.replace("_", " ") + (f" at the {joint}" if joint else ""),
                     "effect": effect,
                     "chart": None if chart is None else {"svg": chart.svg(), "legend": chart.legend()},
                 }
@@ -59,7 +59,7 @@ def curve(effect: MissingEffect, waves: Waveforms, units: Mapping[str, str]) -> 
     Returns:
         The chart, None where the effect explains nothing.
     """
-    explained = _explained(effect, waves)
+    explained = waves.explained.get(effect.title)
     if explained is None:
         return None
     e = int(np.argmax((explained**2).sum(axis=0)))
@@ -77,22 +77,14 @@ def curve(effect: MissingEffect, waves: Waveforms, units: Mapping[str, str]) -> 
     over_time = label.startswith("time")
     marks: list[Mark] = [Points(axis[::step], left[::step], "before", "residual left to it")]
     line = Line(axis[order], torque[order], "after", "the effect") if over_time else _smoothed(axis, torque)
-    names = [name for name, values in waves.explained.items() if values is explained]
-    if names and names[0] in waves.bands:
-        std = waves.bands[names[0]][:, e]
+    if effect.title in waves.bands:
+        std = waves.bands[effect.title][:, e]
         half = 2.0 * (std[order] if over_time else _smoothed(axis, std).y)
         marks.append(Band(line.x, line.y - half, line.y + half, "after", "\N{PLUS-MINUS SIGN}2 std of the effect"))
     return Chart(
         [*marks, line],
         label, torque_label, width=900, height=260,
     )  # fmt: skip
-
-
-def _explained(effect: MissingEffect, waves: Waveforms) -> FloatArray | None:
-    names = [name for name in waves.explained if effect.effect in name]
-    if len(names) > 1:
-        names = [name for name in names if effect.joint is None or effect.joint in name] or names
-    return waves.explained[names[0]] if names else None
 
 
 def _abscissa(
