@@ -50,6 +50,10 @@ MANY = 4
 USEFUL_BESIDE_MANY = 0.5
 """... this share: a few more that are really there explain the rest, what the library does not have is never done."""
 
+USEFUL_AGAIN = 0.4
+"""Another of a kind that was added at the same joint must explain this share: orders of a ripple that are really there
+explain the rest, a form that is not that of a ripple is a sum of many."""
+
 SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
@@ -244,19 +248,21 @@ def next_effect(
     accepted: list[tuple[Fit, float]] = []
     steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
     most, promised, explained = 0.0, 0.0, False
+    again = {effect_key(effect) for effect in fit.effects[len(bench.effects) :]}
     refits: list[tuple[Candidate, float]] = []
     as_good = sum(c.gain > AS_MUCH * worth[0].gain for c in worth[:MOST_FINALISTS])
     for candidate in of_every_kind(worth, max(FINALISTS, as_good), worth[0].effect.joint if worth else None):
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
             continue
         leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]
+        least = max(useful, USEFUL_AGAIN * fit.excess) if candidate.key in again else useful
         # one that explains too little, or less than those that are compared in the end, need not be known exactly
-        beat = min([fit.statistic - useful, *leaders[LAST_TWO - 1 :]])
+        beat = min([fit.statistic - least, *leaders[LAST_TWO - 1 :]])
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
         refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
-        if p_value > FAMILY_LEVEL or gain < useful or not _acceptable(bench, fit, new, steps, smallest):
+        if p_value > FAMILY_LEVEL or gain < least or not _acceptable(bench, fit, new, steps, smallest):
             continue
         accepted.append((new, p_value))
         if gain > most:

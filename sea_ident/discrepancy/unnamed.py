@@ -124,8 +124,8 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
     fit, noise = now.fit, now.noise
     first = len(fit.effects) - selection.added
     found = []
-    for one, other in combinations(range(first, len(fit.effects)), 2):
-        own, second = fit.effects[one], fit.effects[other]
+    for one, two in combinations(range(first, len(fit.effects)), 2):
+        own, second = fit.effects[one], fit.effects[two]
         if own.joint != second.joint:
             continue
         family: tuple[Effect, ...] = (*behind_the_spring(bench, own), *behind_the_spring(bench, second))
@@ -133,7 +133,7 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
             family = (*one_sided(own), *one_sided(second), *family)
         if not family:
             continue
-        others = [e for k, e in enumerate(fit.effects) if k not in (one, other)]
+        others = [e for k, e in enumerate(fit.effects) if k not in (one, two)]
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
         for candidate in scan(bench, reduced, noise, family)[:TRIED_FOR_TWO]:
@@ -147,7 +147,8 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
                 new = bench.refine(new.effects, noise, start=new.parameters)
             if new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
-                found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new, second.name))
+                other = second.title.removesuffix(f" at {second.joint}")
+                found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new, other))
                 break
     return tuple(found)
 

@@ -149,7 +149,7 @@ def simulate(
                 "one period to the next"
             )
     if lead_samples:
-        state = passes.lead_in(state, lead_samples)
+        state = passes.settle(state, lead_samples)
     varied = FrictionJitter.usual(robot) if jitter is None else (jitter,) * robot.n
     seeds = streams[0].spawn(robot.n)
     system.replace_motor_friction([v.on(f, child) for v, f, child in zip(varied, motors, seeds, strict=True)])

@@ -65,13 +65,10 @@ class Passes:
         self._tau_spring: list[list[float]] = []
         self.steps = 0
 
-    def settle(self, state: FloatArray) -> FloatArray:
-        """State after one pass that is not recorded, in the time before the recording."""
-        return self._run(state, self._begin - self._clock.duration, keep=False)
-
-    def lead_in(self, state: FloatArray, samples: int) -> FloatArray:
-        """State at the begin of the recording, from that so many samples before it; none of it is recorded."""
-        return self._run(state, self._begin - self._clock.duration, self._clock.samples - samples, keep=False)
+    def settle(self, state: FloatArray, samples: int | None = None) -> FloatArray:
+        """State when the recording begins, from the state a number of samples before, a whole pass by default."""
+        first = 0 if samples is None else self._clock.samples - samples
+        return self._run(state, self._begin - self._clock.duration, first, keep=False)
 
     def record(self, state: FloatArray, number: int) -> FloatArray:
         """State after the recorded pass of this number."""

@@ -104,6 +104,15 @@ def test_only_against_the_reference(leg, series, model):
     assert found.verdict is Verdict.ONLY_AGAINST_REFERENCE
 
 
+def test_a_reference_whose_effects_the_recording_cannot_show_is_not_compared_and_that_is_said(model, intact):
+    warm = replace(model, effects=(*model.effects, make_effect("temperature_friction", "hip")))
+    diagnosis = quietly(model, intact, reference=warm)
+    assert diagnosis.verdict is Verdict.NONE
+    said = [text for text in diagnosis.warnings if "not compared with the reference" in text]
+    assert len(said) == 1
+    assert "temperature" in said[0]
+
+
 def test_cannot_tell_from_one_pass(leg, series, model):
     motion = recorded(leg, series[0], periods=1)
     assert quietly(model, motion).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)

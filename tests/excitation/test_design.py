@@ -26,6 +26,7 @@ from sea_ident.motion import FourierSeries
 from sea_ident.regressor import build_regressor, inverse_dynamics
 
 SMALL = {"harmonics": 4, "starts": 2, "rate": 50.0}
+THOROUGH = {**SMALL, "starts": 6}
 
 
 @pytest.fixture(scope="module")
@@ -99,10 +100,9 @@ def test_far_better_than_random_starts(exo, designed):
 
 
 def test_same_seed_same_result_whatever_the_jobs(exo):
-    problem = {**SMALL, "starts": 6}
-    first = design_excitation(exo, seed=5, jobs=1, **problem)
-    again = design_excitation(exo, seed=5, jobs=2, **problem)
-    other = design_excitation(exo, seed=6, jobs=2, **problem)
+    first = design_excitation(exo, seed=5, jobs=1, **THOROUGH)
+    again = design_excitation(exo, seed=5, jobs=2, **THOROUGH)
+    other = design_excitation(exo, seed=6, jobs=2, **THOROUGH)
     np.testing.assert_array_equal(first.series.coefficients, again.series.coefficients)
     assert first.start_values == again.start_values
     assert other.log_det != first.log_det
@@ -137,7 +137,7 @@ def test_every_criterion_is_best_in_its_own_sense(exo):
     table = np.zeros((4, 4, 4))  # seed, criterion that judges, criterion of the design
     for seed in range(4):
         for k, designed_for in enumerate(criteria):
-            found = design_excitation(exo, seed=seed, criterion=designed_for, **{**SMALL, "starts": 6})
+            found = design_excitation(exo, seed=seed, criterion=designed_for, **THOROUGH)
             rows = model.columns.at(found.series.sample(50.0)).columns()
             matrix = np.einsum("rpn,rsn->ps", rows, rows)
             table[seed, :, k] = [criterion.reported(matrix) for criterion in criteria]
