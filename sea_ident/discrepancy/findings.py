@@ -121,6 +121,10 @@ class Alternative:
     dearer: bool = field(default=False, compare=False, repr=False)
 
 
+TIMES = 1.0
+"""Share of the torque from which on an effect is said to be so many times the torque [-]."""
+
+
 @dataclass(frozen=True)
 class MissingEffect:
     """An effect that the model lacks.
@@ -160,6 +164,9 @@ class MissingEffect:
         """How much there is of it: its amounts where it acts on what is measured, the torque of all others."""
         if isinstance(self.detail, SignalEffect) and self.parameters:
             return ", ".join(f"{p.value:.2g} {p.unit}" for p in self.parameters)
+        if self.torque_share >= TIMES:
+            # a term of the law of a spring may be cancelled by others of it
+            return f"{self.torque_share:.2g} times the torque"
         return f"{100 * self.torque_share:.2g} % of torque"
 
 

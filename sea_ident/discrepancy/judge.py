@@ -1,5 +1,7 @@
 """What speaks for an effect in a fit, and what against it."""
 
+from typing import TypeGuard
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -16,6 +18,7 @@ from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
 
 LARGEST_TIMES_TORQUE = 1.5
@@ -209,18 +212,24 @@ def only_elastic(bench: Bench, fit: Fit, position: int) -> NDArray[np.bool_]:
 
 
 def pushes_back(bench: Bench, fit: Fit, position: int) -> bool:
-    """Whether a spring with two different sides is stiff, and not the opposite, as far as this motion deflects it.
+    """Whether a spring of another law is stiff, and not the opposite, as far as this motion deflects it.
 
     To either side: a spring that is always loaded one way is a spring all the same, and not by the other side alone.
     """
     effect = fit.effects[position]
-    if not isinstance(effect, AsymmetricSpring):
+    if not is_of_a_law(effect):
         return True
     deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(effect.required_joint)]
     deflection = np.concatenate([deflection, -deflection])
     linear, cubic = (fit.parameters.get(f"{effect.joint}.{name}", 0.0) for name in SPRING_LAW)
-    slope = linear + 3.0 * cubic * deflection**2 + fit.parameters[effect.parameter_name()] * effect.slope(deflection)
+    (column,) = effect.columns(bench.robot)
+    slope = linear + 3.0 * cubic * deflection**2 + fit.parameters[column.name] * effect.slope(deflection)
     return bool(np.min(slope) > 0.0)
+
+
+def is_of_a_law(effect: Effect) -> TypeGuard[AsymmetricSpring | SpringStiffening]:
+    """Whether an effect is a term more in the law of a spring, beside the linear and the cubic one."""
+    return isinstance(effect, AsymmetricSpring) or (isinstance(effect, SpringStiffening) and effect.exponent != CUBIC)
 
 
 def brakes(bench: Bench, fit: Fit, position: int) -> bool:
@@ -272,7 +281,8 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
     spectra = bench.column_spectra(effect, fit.effects)
     power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))
     total = np.sqrt(np.sum(np.abs(spectra @ values) ** 2, axis=0))
-    if np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms):
+    # terms of the law of one spring cancel in part, and what they come to is asked above
+    if not is_of_a_law(effect) and np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms):
         return False
     elastic = only_elastic(bench, fit, position)
     for k, column in enumerate(columns):

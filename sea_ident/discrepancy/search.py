@@ -18,6 +18,7 @@ from sea_ident.discrepancy.judge import (
     at_a_bound,
     bends_another,
     flat_steps,
+    is_of_a_law,
     own_torque,
     penalty,
     physical,
@@ -322,7 +323,8 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: F
     ):
         return False
     own = own_torque(bench, new, -1)
-    if own > LARGE_TORQUE and not is_signal(effect) and torque_change(bench, fit, new) < CANCELLED * own:
+    cancels = is_signal(effect) or is_of_a_law(effect)  # an error of a sensor is taken up, and so is a term of a law
+    if own > LARGE_TORQUE and not cancels and torque_change(bench, fit, new) < CANCELLED * own:
         return False
     if fit.statistic - new.statistic > COMPLETE * fit.excess:
         smallest = np.minimum(smallest, SMALLEST_SHARE)

@@ -43,6 +43,11 @@ class SpringStiffening(SpringEffect):
         deflection = theta - q
         return (deflection * np.abs(deflection) ** (self.exponent - 1.0))[:, None]
 
+    def slope(self, deflection: FloatArray) -> FloatArray:
+        """(N,) stiffness at deflections (N,) of a spring with K = 1."""
+        slope: FloatArray = self.exponent * np.abs(deflection) ** (self.exponent - 1.0)
+        return slope
+
     def prior(self, robot: Robot) -> FloatArray:
         """The annotation's cubic stiffness."""
         return stated(robot.spring(self.required_joint).cubic_stiffness if self.exponent == CUBIC else None)

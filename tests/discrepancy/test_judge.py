@@ -90,6 +90,32 @@ def test_a_spring_with_two_sides_is_stiff_to_either_side(nothing_missing, expone
     assert seen == {True, False}
 
 
+@pytest.mark.parametrize("exponent", [2.0, 5.0])
+def test_a_spring_of_another_power_is_stiff_however_its_terms_cancel(nothing_missing, exponent):
+    """Only the whole law is a torque: a term of it may be larger than all torque there is, beside another as large."""
+    bench, start = nothing_missing
+    effect = make_effect("spring_stiffening", "knee", exponent=exponent)
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    names = [c.name for c in fit.columns]
+    terms = ("spring_stiffness", "spring_stiffening", "spring_stiffening_power")
+    law = [names.index(f"knee.{name}") for name in terms]
+    farthest = float(np.max(np.abs(bench.data.motion.deflection[:, 1])))
+    d = np.linspace(0.0, farthest, 2001)[1:]
+    rows = np.stack([d, d**3, d**exponent], axis=1)
+    seen = set()
+    for stiffness in (50.0, 2000.0):
+        for share in (-1.0, -0.6, -0.1, 0.1, 2.0):
+            values = fit.values.copy()
+            # its torque where the spring is bent most, as a share of that of the linear term
+            values[law] = stiffness, 0.0, share * stiffness * farthest ** (1.0 - exponent)
+            grows = bool(np.all(np.diff(rows @ values[law]) > 0.0))
+            law_of = replace(fit, values=values)
+            assert pushes_back(bench, law_of, -1) == grows
+            assert physical(bench, law_of, -1) == grows
+            seen.add(grows)
+    assert seen == {True, False}
+
+
 @pytest.mark.parametrize("name", ["stribeck_friction", "nonlinear_viscous_friction"])
 def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing, name):
     bench, start = nothing_missing

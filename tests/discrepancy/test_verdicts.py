@@ -200,7 +200,8 @@ def test_an_error_of_an_encoder_is_said_in_its_own_unit():
         "encoder_offset", "knee", (shift,), 4.1, 0.0, (), detail=make_effect("encoder_offset", "knee")
     )
     assert offset.extent == "-0.0026 rad"
-    assert MissingEffect("torque_offset", "knee", (shift,), 0.041, 0.0, ()).extent == "4.1 % of torque"
+    for share, said in ((0.041, "4.1 % of torque"), (0.46, "46 % of torque"), (43.0, "43 times the torque")):
+        assert MissingEffect("torque_offset", "knee", (shift,), share, 0.0, ()).extent == said
 
 
 # -- input that proves nothing
