@@ -81,7 +81,7 @@ class Diagnosis:
             lines.append(f"  {kind}: {m.title}, {m.extent}, p {chance(m.p_value)}")
             lines.extend(f"    {p}" for p in m.parameters)
             if m.alternatives:
-                others = ", ".join(f"{a.effect} at {a.joint} ({a.cos2:.3f})" for a in m.alternatives)
+                others = ", ".join(f"{a.title} ({a.cos2:.3f})" for a in m.alternatives)
                 lines.append(f"    or: {others}")
         gaps = {"training": self.training, "held out": self.holdout}
         gaps |= {f"forward simulation of {kind}": gap for kind, gap in self.simulation_gap.items()}

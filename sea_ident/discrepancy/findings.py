@@ -120,6 +120,15 @@ class Alternative:
     fit: Fit | None = field(default=None, compare=False, repr=False)
     dearer: bool = field(default=False, compare=False, repr=False)
 
+    @property
+    def title(self) -> str:
+        """Name and joint."""
+        return _at(self.effect, self.joint)
+
+
+def _at(effect: str, joint: str | None) -> str:
+    return effect if joint is None else f"{effect} at {joint}"
+
 
 TIMES = 1.0
 """Share of the torque from which on an effect is said to be so many times the torque [-]."""
@@ -157,7 +166,7 @@ class MissingEffect:
         """Name and joint; with what tells it from another of its kind at the joint."""
         if self.detail is not None:
             return self.detail.title
-        return self.effect if self.joint is None else f"{self.effect} at {self.joint}"
+        return _at(self.effect, self.joint)
 
     @property
     def extent(self) -> str:

@@ -351,10 +351,10 @@ def _text(
                 f"beginning at {times} s{more}; these parts were left out."
             )
             continue
-        item = next(f for f in found if f.effect.name == m.effect and f.effect.joint == m.joint)
-        others = "".join(f" or {a.effect} at {a.joint}" for a in m.alternatives)
+        item = next(f for f in found if f.effect.title == m.title)
+        others = "".join(f" or {a.title}" for a in m.alternatives)
         parts.append(
-            f"The data speak for {m.effect} at {m.joint}{others} ({100 * m.torque_share:.2g} % of torque): with it "
+            f"The data speak for {m.title}{others} ({100 * m.torque_share:.2g} % of torque): with it "
             f"{item.better} of {BLOCKS} blocks are predicted better, {100 * item.gain:.0f} % less squared error."
         )
     parts.extend(

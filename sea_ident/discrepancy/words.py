@@ -222,8 +222,7 @@ def _opening(facts: Facts) -> str:
             return f"The model lacks {names}."
         case Verdict.AMBIGUOUS:
             alike = "; nor ".join(
-                f"{', '.join([m.title, *(f'{a.effect} at {a.joint}' for a in m.alternatives[:-1])])} from "
-                f"{m.alternatives[-1].effect} at {m.alternatives[-1].joint}"
+                f"{', '.join([m.title, *(a.title for a in m.alternatives[:-1])])} from {m.alternatives[-1].title}"
                 for m in facts.missing
                 if m.alternatives
             )

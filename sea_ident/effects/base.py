@@ -306,7 +306,7 @@ class Effect(ABC):
     def beside(self) -> Self | None:
         """The same effect in another form, which can stand in a model beside this one; by default there is none.
 
-        The names of its parameters and its title are others, or it is not tried where this one is there.
+        The names of its parameters are others, or it is not tried where this one is there.
         """
         return None
 

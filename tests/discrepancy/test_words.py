@@ -57,6 +57,14 @@ def facts(verdict, periods=12, remainder=0.0, p_value=0.0, sound=True, trends=()
     return Facts(verdict, missing, gap, None, remainder, periods, p_value, trend, None, {"hip": "N m"}, sound=sound)
 
 
+def test_what_acts_on_the_whole_robot_has_no_joint_in_words():
+    tilt, offset = Alternative("base_tilt", None, 0.99), Alternative("spring_offset", "hip", 0.98)
+    for others, told in (((tilt,), "torque_offset at hip from base_tilt."),
+                         ((tilt, offset), "torque_offset at hip, base_tilt from spring_offset at hip.")):  # fmt: skip
+        missing = (MissingEffect("torque_offset", "hip", (), 0.05, 1e-9, others),)
+        assert f"does not tell {told}" in paragraph(replace(facts(Verdict.AMBIGUOUS), missing=missing))
+
+
 @pytest.mark.parametrize("verdict", [Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER])
 def test_few_periods_are_said_before_the_name(verdict):
     assert paragraph(facts(verdict)).startswith("The model lacks torque_offset at hip")
