@@ -208,6 +208,17 @@ def test_two_of_a_kind_at_one_joint_have_a_curve_each_under_a_heading_of_their_o
         assert heading in page
 
 
+def test_a_ripple_is_drawn_over_the_position_of_its_motor_where_the_spring_bends(diagnosis):
+    waves, ripple = diagnosis.waveforms, make_effect("torque_ripple", "knee")
+    bent = 0.05 * np.sin(11.0 * waves.time)[:, None] * np.ones((1, 3))
+    torque = np.zeros((400, 6))
+    missing = MissingEffect("torque_ripple", "knee", (), 0.1, 1e-9, (), detail=ripple)
+    for deflection, label in ((bent, "motor position of the knee [rad]"), (0.0 * bent, "position of the knee [rad]")):
+        torque[:, 2] = np.sin(30.0 * (waves.q + deflection)[:, 1])
+        seen = replace(waves, deflection=deflection, explained={ripple.title: torque})
+        assert curve(missing, seen, diagnosis.units).x_label == label
+
+
 def test_a_sliding_joint_has_its_own_units(diagnosis, tmp_path):
     slides = replace(diagnosis, units={"hip": "N m", "knee": "N", "ankle": "N m"})
     chart = curve(slides.missing[0], slides.waveforms, slides.units)

@@ -90,7 +90,7 @@ def curve(effect: MissingEffect, waves: Waveforms, units: Mapping[str, str]) -> 
 def _abscissa(
     effect: MissingEffect, waves: Waveforms, equation: int, torque: FloatArray, units: Mapping[str, str]
 ) -> tuple[FloatArray, str]:
-    """Of velocity, position and deflection of its joint the one that the torque is a function of, else time.
+    """Of velocity, positions and deflection of its joint the one that the torque is a function of, else time.
 
     Over what it depends on in part only, a line would jump from sample to sample.
     """
@@ -103,6 +103,7 @@ def _abscissa(
         (waves.dtheta[:, i], f"motor velocity of the {joint} [{speed}]"),
         (waves.deflection[:, i], f"deflection of the {joint} [{unit}]"),
         (waves.q[:, i], f"position of the {joint} [{unit}]"),
+        (waves.q[:, i] + waves.deflection[:, i], f"motor position of the {joint} [{unit}]"),
     ]
     scores = [_share_explained(x, torque) for x, _ in candidates]
     best = int(np.argmax(scores))
