@@ -295,7 +295,8 @@ def diagnose(name: str, case: Case, folder: Path) -> bool:
     said = []
     for m in found["missing"]:
         values = ", ".join(f"{p['name']} {p['value']:.4g} +- {p['std']:.2g} {p['unit']}" for p in m["parameters"][:3])
-        said.append(f"{m['effect']} at {m['joint']}: {values}" + (" (or others)" if m["alternatives"] else ""))
+        where = m["effect"] if m["joint"] is None else f"{m['effect']} at {m['joint']}"
+        said.append(f"{where}: {values}" + (" (or others)" if m["alternatives"] else ""))
     print(f"{'right' if right else 'WRONG':6}{name:10} {seconds:5.1f} s  {found['verdict']:24} truth: {case.truth}")
     for line in said:
         print(f"{'':27}{line}")
