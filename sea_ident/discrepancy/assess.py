@@ -23,9 +23,10 @@ from sea_ident.discrepancy.judge import (
     too_short,
 )
 from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL
 from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.refit import of_every_kind, refitted
-from sea_ident.discrepancy.search import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, Selection
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
 from sea_ident.effects import Effect

@@ -12,7 +12,8 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import candidate_effects, scan
 from sea_ident.discrepancy.judge import physical, significance
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import Effect
 

@@ -12,7 +12,8 @@ from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.search import BESIDE_ANOTHER, MOST_EFFECTS, SMALLEST_SHARE, next_effect
+from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, SMALLEST_SHARE, next_effect
+from sea_ident.discrepancy.search import MOST_EFFECTS
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
 from sea_ident.effects import Effect

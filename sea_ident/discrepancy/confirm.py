@@ -11,7 +11,8 @@ from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.search import FAMILY_LEVEL, MOST_EFFECTS, SMALLEST_SHARE, Selection, search, without
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
 FAR = 6

@@ -8,7 +8,8 @@ from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.contribution import as_known
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, significance
-from sea_ident.discrepancy.search import FAMILY_LEVEL, Selection
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect

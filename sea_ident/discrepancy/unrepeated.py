@@ -30,9 +30,9 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.search import FAMILY_LEVEL
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
 from sea_ident.effects import Effect, make_effect, spring_effects

@@ -7,8 +7,8 @@ import sea_ident.discrepancy.exchange as module
 from sea_ident.discrepancy.candidates import scan, sought
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.exchange import Outdone, exchange
+from sea_ident.discrepancy.next_effect import next_effect
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import next_effect
 from sea_ident.discrepancy.settle import settle_again
 
 

@@ -7,20 +7,10 @@ import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
-from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import (
-    BESIDE_ANOTHER,
-    Selection,
-    _acceptable,
-    least_useful,
-    next_effect,
-    search,
-    still_needed,
-    visible_changes,
-)
+from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, visible_changes
+from sea_ident.discrepancy.search import Selection, search, still_needed
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 
@@ -82,26 +72,6 @@ def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
     again = search(bench, bench.effects)
     assert named(again) == named(found)
     assert again.final.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
-
-
-def test_what_promised_about_as_much_as_what_explains_it_all_is_compared(laboratory, monkeypatch):
-    """Two links that a push moves in nearly the same way promise the same; which was first says nothing."""
-    bench = laboratory.bench(laboratory.record([("torque_offset", "knee", [2.0], {})]))
-    start = settle(bench, bench.effects)
-    found = {(c.effect.name, c.effect.joint): c for c in scan(bench, start.fit, start.noise)}
-    first, others = found["torque_offset", "knee"], [found["torque_constant", "knee"], found["parallel_spring", "knee"]]
-    shares = 0.97, 0.5
-    given = [first, *(replace(c, gain=share * first.gain) for c, share in zip(others, shares, strict=True))]
-    tried = []
-
-    def noted(bench, before, effect, *rest):
-        tried.append(effect.name)
-        return refitted(bench, before, effect, *rest)
-
-    monkeypatch.setitem(next_effect.__globals__, "refitted", noted)
-    fit, _ = next_effect(bench, start, given, 1000, np.full(len(bench.data.equations), 1e-3))
-    assert tried == ["torque_offset", "torque_constant"]
-    assert fit.effects[-1].name == "torque_offset"
 
 
 def test_a_push_has_its_edges_right_before_another_takes_its_place(unequal, monkeypatch):
@@ -177,44 +147,6 @@ def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_
     assert sizes["position_dependent_friction"] < BESIDE_ANOTHER * sizes["torque_ripple"]
 
 
-@pytest.mark.parametrize(
-    ("needed", "wave", "share", "beside_few", "beside_many"),
-    [
-        (1.0, 0.4, 0.7, True, True),
-        (1.0, 0.75, 0.35, True, False),
-        (1.0, 1.8, 0.06, False, False),
-        (0.1, 0.75, 0.35, True, True),
-    ],
-)
-def test_beside_many_effects_one_more_must_explain_half_of_what_is_left(
-    nothing_missing, needed, wave, share, beside_few, beside_many
-):
-    """A ripple, and a wave in time that no effect of the library is: the larger it is, the less the ripple explains.
-
-    Where it explains more than what was found before it, it is as useful as these are.
-    """
-    data = nothing_missing[0].data
-    time, theta = data.motion.time - data.motion.time[0], data.motion.theta[:, 0]
-    torque = data.tau_motor.copy()
-    torque[:, 0] += np.sin(12.0 * theta) + wave * np.sin(2.0 * np.pi * 23.0 * time / data.period)
-    others = [make_effect("torque_offset", joint) for joint in ("hip", "knee", "ankle")]
-    others.append(make_effect("nonlinear_viscous_friction", "ankle", exponent=2.0))
-    state = nothing_missing[0].state(())
-    torque += needed * sum(effect.evaluate(state).motor[:, :, 0] for effect in others)
-    changed = replace(data, tau_motor=torque)
-    usual = nothing_missing[0].effects
-    bench = Bench(changed, usual)
-    fit = bench.fit((*usual, *others), nothing_missing[1].noise)
-    new = bench.fit((*fit.effects, make_effect("torque_ripple", "hip", order=12.0)), nothing_missing[1].noise)
-    assert (fit.statistic - new.statistic) / fit.excess == pytest.approx(share, abs=0.1)
-    quiet, nothing = np.random.default_rng(0).standard_normal((8, len(fit.whitened))), np.zeros(len(data.equations))
-    assert _acceptable(bench, fit, new, quiet, nothing)
-    # the same two models, with four effects that were added before it and with three
-    now, gain = Settled(fit, nothing_missing[1].noise), fit.statistic - new.statistic
-    assert (gain >= least_useful(bench, now)) is beside_many
-    assert (gain >= least_useful(Bench(changed, (*usual, others[0])), now)) is beside_few
-
-
 def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
     """The model has the cubic stiffness; a spring that stiffens with the square is no asymmetric one for that."""
     planted = [("spring_stiffening", "knee", [3000.0], {"exponent": 2.0})]
@@ -266,24 +198,6 @@ def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(la
     assert kept(2.0, []) == 0
     assert kept(2.0, [ripple]) == 1
     assert kept(0.01, []) == 1
-
-
-def test_what_promises_about_as_much_as_the_best_is_refitted_though_others_come_first(rippled):
-    bench, start, _ = rippled
-    scanned = scan(bench, start.fit, start.noise)
-    right = next(c for c in scanned if (c.effect.name, c.effect.joint) == ("torque_ripple", "hip"))
-    motor = [c for c in scanned if c.effect.side is right.effect.side and c.key != right.key]
-    others = [c for c in motor if not is_signal(c.effect) and c.effect.joint != "hip"][:4]
-    smallest = np.full(len(bench.data.equations), 1e-3)
-
-    def chosen(share):
-        first = [replace(c, gain=1.01 * right.gain) for c in others]
-        step = next_effect(bench, start, [*first, replace(right, gain=share * right.gain)], 1000, smallest)
-        return step is not None and step[0].effects[-1].name == "torque_ripple"
-
-    assert len(others) == 4
-    assert chosen(1.0)
-    assert not chosen(0.5)
 
 
 @pytest.mark.parametrize("first", [0, 1])

@@ -1,0 +1,194 @@
+"""The next effect of a search: which of the candidates is added, and what it must come to."""
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.breakaway import lets_go_late
+from sea_ident.discrepancy.candidates import Candidate
+from sea_ident.discrepancy.columns import effect_key
+from sea_ident.discrepancy.exchange import Outdone, Tried
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.judge import (
+    at_a_bound,
+    flat_steps,
+    is_of_a_law,
+    own_torque,
+    penalty,
+    physical,
+    scatter_p,
+    significance,
+    too_short,
+    torque_change,
+    torque_changes,
+)
+from sea_ident.discrepancy.refit import of_every_kind, refitted
+from sea_ident.discrepancy.settle import Settled
+
+FAMILY_LEVEL = 1e-3
+"""Probability of accepting anything where nothing is missing."""
+
+USEFUL_SHARE = 0.2
+"""Share of the excess that an effect must explain to be accepted, ..."""
+
+MANY = 4
+"""... and from so many effects on that are there before it ..."""
+
+USEFUL_BESIDE_MANY = 0.5
+"""... this share: a few more that are really there explain the rest, what the library does not have is never done."""
+
+USEFUL_AGAIN = 0.4
+"""Another of a kind that was added at the same joint must explain this share: orders of a ripple that are really there
+explain the rest, a form that is not that of a ripple is a sum of many."""
+
+SMALLEST_SHARE = 1e-3
+"""An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
+
+BESIDE_ANOTHER = 0.12
+"""And by this share of what another effect does to the same equation: the form of that one is known no better, ..."""
+
+COMPLETE = 0.9
+"""... unless it explains this share of the excess: what another effect in the wrong form leaves is none of its own."""
+
+LARGE_TORQUE = 0.3
+"""An effect of more than this share of the torque (rms) must be visible as such, ..."""
+
+CANCELLED = 0.02
+"""... with more than this share of it not taken up by other parameters."""
+
+SCATTER_LEVEL = 1e-5
+"""Probability that an effect must not exceed by the scatter of the periods along its own columns."""
+
+FINALISTS = 4
+"""Candidates that are refitted with everything free before one is accepted, and the best of every kind too, ..."""
+
+MOST_FINALISTS = 7
+"""... and up to so many where they promise about as much as the best of them."""
+
+LAST_TWO = 2
+"""Of these the best are compared with the shapes of the model refined too."""
+
+LITTLE_LEFT = 0.02
+"""An effect that leaves less than this share of the excess is compared only with what promises more than it, ..."""
+
+AS_MUCH = 0.95
+"""... or about as much as it did, this share at least: a push on the link before it does nearly the same, ..."""
+
+NEARLY_RIGHT = 3.0
+"""... once one leaves less than this statistic over degrees of freedom."""
+
+
+def next_effect(
+    bench: Bench,
+    now: Settled,
+    candidates: list[Candidate],
+    tests: int,
+    smallest: FloatArray,
+    tried: Tried | None = None,
+) -> tuple[Fit, float] | None:
+    """The best candidate refitted with everything free and its significance, None where none is worth it.
+
+    Of a candidate at least one equation must change by what is `smallest` (E,) there, as a share of the torque. What is
+    outdone by the best is noted among what was `tried`.
+    """
+    fit, noise = now.fit, now.noise
+    worth = [
+        c for c in candidates if c.gain > 0.0 and significance(c.gain, c.columns, tests, fit, noise) < 10 * FAMILY_LEVEL
+    ]
+    accepted: list[tuple[Fit, float]] = []
+    steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
+    most, promised, explained = 0.0, 0.0, False
+    again = {effect_key(effect) for effect in fit.effects[len(bench.effects) :]}
+    refits: list[tuple[Candidate, float]] = []
+    as_good = sum(c.gain > AS_MUCH * worth[0].gain for c in worth[:MOST_FINALISTS])
+    for candidate in of_every_kind(worth, max(FINALISTS, as_good), worth[0].effect.joint if worth else None):
+        if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
+            continue
+        leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]
+        least = max(useful, USEFUL_AGAIN * fit.excess) if candidate.key in again else useful
+        # one that explains too little, or less than those that are compared in the end, need not be known exactly
+        beat = min([fit.statistic - least, *leaders[LAST_TWO - 1 :]])
+        new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
+        gain = fit.statistic - new.statistic
+        p_value = significance(gain, candidate.columns, tests, fit, noise)
+        refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
+        if p_value > FAMILY_LEVEL or gain < least or not _acceptable(bench, fit, new, steps, smallest):
+            continue
+        accepted.append((new, p_value))
+        if gain > most:
+            most, promised = gain, candidate.gain
+        explained = explained or new.statistic < NEARLY_RIGHT * new.dof
+    if not accepted:
+        return None
+    # what is left by the best is left by lack of other effects as well, and small differences are a matter of these
+    unit = min((new for new, _ in accepted), key=lambda new: new.statistic).unit
+    accepted.sort(key=lambda item: item[0].statistic + unit * penalty(item[0].effects[-1], bench))
+
+    def score(new: Fit) -> float:
+        whole = bench.refine(new.effects, noise, start=new.parameters) if len(accepted) > 1 else new
+        return whole.statistic + unit * penalty(new.effects[-1], bench)
+
+    best, best_p = min(accepted[:LAST_TWO], key=lambda item: score(item[0]))
+    own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
+    if tried is not None:
+        for candidate, gain in refits:
+            tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
+    return best, best_p
+
+
+def least_useful(bench: Bench, now: Settled) -> float:
+    """Drop of the statistic that one effect more must bring.
+
+    Beside many, less is enough where it explains more than one of these does: that one was only found before it.
+    """
+    fit = now.fit
+    usual, positions = USEFUL_SHARE * fit.excess, range(len(bench.effects), len(fit.effects))
+    if len(positions) < MANY:
+        return usual
+    least = USEFUL_BESIDE_MANY * fit.excess
+    for position in positions:
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        without = bench.fit(others, now.noise, start=fit.parameters, tangents=False)
+        least = min(least, without.statistic - fit.statistic)
+    return max(usual, least)
+
+
+def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: FloatArray) -> bool:
+    """Whether the last effect of a new fit is large enough, could be, and is neither hidden nor a matter of one pass.
+
+    Args:
+        bench: the recording.
+        fit: without the effect.
+        new: with it.
+        steps: (S, M) whitened steps between periods without it.
+        smallest: (E,) change of the torque that matters, as a share of it [-].
+    """
+    effect = new.effects[-1]
+    if (
+        not physical(bench, new, -1)
+        or len(bench.slack_links(new)) > len(bench.slack_links(fit))
+        or at_a_bound(effect)
+        or too_short(bench, effect)
+    ):
+        return False
+    own = own_torque(bench, new, -1)
+    cancels = is_signal(effect) or is_of_a_law(effect)  # an error of a sensor is taken up, and so is a term of a law
+    if own > LARGE_TORQUE and not cancels and torque_change(bench, fit, new) < CANCELLED * own:
+        return False
+    if fit.statistic - new.statistic > COMPLETE * fit.excess:
+        smallest = np.minimum(smallest, SMALLEST_SHARE)
+    if np.all(visible_changes(bench, fit, new) < smallest):
+        return False
+    if scatter_p(steps, fit.whitened - new.whitened) <= SCATTER_LEVEL:
+        return True
+    # what differs from pass to pass because each is let go at another instant may be stiction all the same
+    return lets_go_late(bench, fit, effect)
+
+
+def visible_changes(bench: Bench, before: Fit, after: Fit) -> FloatArray:
+    """(E,) change by the last effect of a fit in every equation, as a share of the torque there [-].
+
+    Where the model bent to do without it, the change is larger than the effect and says nothing of its size.
+    """
+    return np.minimum(torque_changes(bench, before, after), 2.0 * own_torque(bench, after, -1))
