@@ -65,7 +65,7 @@ def least(jittery, laboratory):
 def test_a_search_sees_what_acts_beside_reversals_only_by_what_lets_go_late(sticking, monkeypatch, late, seen):
     bench, _ = sticking
     if not late:
-        for module in ("search", "confirm"):
+        for module in ("next_effect", "confirm"):
             monkeypatch.setattr(f"sea_ident.discrepancy.{module}.lets_go_late", lambda *_: False)
     assert named(confirm(bench, search(bench, bench.effects)).selection) == seen
 
