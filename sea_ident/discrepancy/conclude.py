@@ -31,6 +31,7 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
+from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import longest_standing
@@ -265,7 +266,10 @@ def _missing(
     first = len(fit.effects) - selection.added
     counts = bench.counts(fit.effects)
     out = []
+    nameless = resting(selection, held)
     for k, position in enumerate(range(first, len(fit.effects))):
+        if k in nameless:
+            continue
         effect = fit.effects[position]
         begin = sum(counts[:position])
         columns = fit.columns[begin : begin + counts[position]]

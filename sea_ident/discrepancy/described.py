@@ -50,7 +50,9 @@ class Beginning:
     left: FloatArray
 
 
-def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFloor, start: Mapping[str, float]) -> Fit:
+def from_described_springs(
+    bench: Bench, fit: Fit, position: int, noise: NoiseFloor, start: Mapping[str, float], beat: float = np.inf
+) -> Fit:
     """A model whose effect in the chain of signals may have ended in the wrong place, begun from described springs.
 
     Args:
@@ -59,6 +61,7 @@ def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFl
         position: of the effect in it.
         noise: noise floor.
         start: parameters that the fit was begun from.
+        beat: statistic that is of interest; what will stay above need not be exact.
 
     Returns:
         The fit that comes of the other beginning where springs have bent, that is another place and better; else the
@@ -78,7 +81,8 @@ def from_described_springs(bench: Bench, fit: Fit, position: int, noise: NoiseFl
     # the noise floor of a model that has bent its springs is as wrong as they are
     own = bench.noise(bench.predicted(model, begun.parameters))
     right = bench.refine(model, own, start=begun.parameters, only=len(bench.effects))
-    new = bench.refine(right.effects, noise, start=right.parameters, only=len(bench.effects))
+    least = min(beat, fit.statistic)
+    new = bench.refine(right.effects, noise, start=right.parameters, only=len(bench.effects), beat=least)
     return min((fit, new), key=lambda one: (len(bench.slack_links(one)), one.statistic))
 
 

@@ -1,7 +1,7 @@
 """`diagnose`: where a model and a recording disagree, and which effect is missing."""
 
 import warnings as python_warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 from sea_ident._typing import FloatArray
@@ -29,6 +29,7 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference, identified_like
 from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, still_needed, without
 from sea_ident.discrepancy.settle import Settled, settle
@@ -125,7 +126,8 @@ def diagnose(
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     tell("testing on held-out data", 0.75)
     confirmed, alternatives, held, held_notes = _tested(bench, confirmed, alternatives, trends, holdout)
-    selection = confirmed.selection
+    selection, alternatives, held = with_constants_at_rest(bench, confirmed.selection, alternatives, held)
+    confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     nameless: tuple[Unnamed, ...] = ()
     if basic is None:
         drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
@@ -136,9 +138,9 @@ def diagnose(
     tell("simulating", 0.85)
     repaired = repaired_model(model, as_identified, selection.final.fit)
     forward = _forward(model, repaired, selection, held, recording, processed, controller)
-    sticking = _sticking(bench, selection)
+    spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    said = (*notes.warnings, *found.notes, *basic_notes, *sticking, *held_notes, *change_notes, *forward.notes)
+    said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *forward.notes)
     notes = replace(notes, warnings=said)
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
@@ -230,12 +232,12 @@ def _tested(
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
-    constant = {e.joint for e in confirmed.selection.effects if isinstance(e, SpringOffset)}
+    constant, slipped = (_joints_of(kind, confirmed.selection) for kind in (SpringOffset, SpringHysteresis))
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     searched = False
-    while weak := _out(held, len(trends.trends)):
+    while weak := _out(held, len(trends.trends), resting(confirmed.selection, held)):
         left = without(bench, confirmed.selection, weak)
         ruled_out = {effect_key(confirmed.selection.effects[k]) for k in weak}
         other = None if searched else _searched_beside(bench, left, ruled_out)
@@ -243,8 +245,8 @@ def _tested(
         selection, alternatives = _with_alternatives(bench, left if other is None else other.selection)
         selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
         confirmed = (other or confirmed).less(selection)
-    slipping = [e.required_joint for e in confirmed.selection.effects if isinstance(e, SpringHysteresis)]
-    told = tuple(words.told_by_the_other_motion(joint) for joint in slipping if joint in constant)
+    read_there = _joints_of(SpringHysteresis, confirmed.selection) & constant - slipped
+    told = tuple(words.told_by_the_other_motion(joint) for joint in sorted(read_there))
     return confirmed, alternatives, held, (*notes, *told)
 
 
@@ -260,10 +262,19 @@ def _searched_beside(bench: Bench, left: Selection, ruled_out: set[Key]) -> Conf
     return found if found.selection.added > left.added else None
 
 
-def _out(held: HeldOut, drifting: int) -> list[int]:
-    """Which effects do not hold on another motion, of those of which something is left beside as many that drift."""
-    weak = [k for k, found in enumerate(held.transfers) if not found.holds]
-    if len(weak) < len(held.transfers) + drifting:
+def _joints_of(kind: type[SpringOffset | SpringHysteresis], selection: Selection) -> set[str]:
+    """Joints in whose spring an effect of this kind was added."""
+    return {effect.required_joint for effect in selection.effects if isinstance(effect, kind)}
+
+
+def _out(held: HeldOut, drifting: int, at_rest: Collection[int]) -> list[int]:
+    """Which effects do not hold on another motion, of those of which something is left beside as many that drift.
+
+    Where dry friction in a spring rests need not be the same there.
+    """
+    tried = [k for k in range(len(held.transfers)) if k not in at_rest]
+    weak = [k for k in tried if not held.transfers[k].holds]
+    if len(weak) < len(tried) + drifting:
         return weak
     return [min(weak, key=lambda k: held.transfers[k].share)] if len(weak) > 1 else []
 
@@ -279,6 +290,12 @@ def _sticking(bench: Bench, selection: Selection) -> tuple[str, ...]:
     count = len(final.fit.effects)
     shown = [stiction(bench, final.fit, k, final.noise) for k in range(count - selection.added, count)]
     return tuple(words.stiction(each, units[each.joint]) for each in shown if each is not None)
+
+
+def _at_rest(selection: Selection, held: HeldOut | None) -> tuple[str, ...]:
+    """Where the dry friction of springs rests, in words."""
+    constants = (selection.effects[k] for k in resting(selection, held))
+    return tuple(words.at_rest(effect.required_joint) for effect in constants if isinstance(effect, SpringOffset))
 
 
 def _unsearched(bench: Bench) -> Selection:

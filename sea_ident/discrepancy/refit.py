@@ -19,6 +19,7 @@ from sea_ident.effects.backlash import NEARLY_HARD, Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
+from sea_ident.effects.spring_hysteresis import WIDER, SpringHysteresis
 
 LARGE_AMOUNT = 0.1
 """Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
@@ -72,6 +73,9 @@ def refitted(
     if isinstance(effect, SignalEffect) and effect.beginnings:
         first = effect.amounts[0].name
         begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
+    if isinstance(effect, SpringHysteresis):
+        # the first of its elements may have been put where the second one is
+        begun.append(replace(effect, slip=effect.slip / WIDER))
     if isinstance(effect, Backlash):
         begun.append(_softened(bench, before, effect, after, noise, start))
     if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
@@ -80,7 +84,7 @@ def refitted(
     fits: list[Fit] = []
     for each in begun:
         model = (*before, each, *after)
-        later = bool(fits) and isinstance(each, SignalEffect)
+        later = bool(fits) and isinstance(each, SignalEffect | SpringHysteresis)
         if later and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
             continue
         if isinstance(each, ExternalForce):
@@ -89,7 +93,7 @@ def refitted(
             fits.append(bench.refine(model, noise, start=start, only=len(bench.effects), beat=beat))
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     if isinstance(effect, SignalEffect):
-        best = from_described_springs(bench, best, len(before), noise, start)
+        best = from_described_springs(bench, best, len(before), noise, start, beat)
     if isinstance(effect, SpringEffect):
         best = _in_its_spring(bench, best, noise, len(before), beat)
         best = at_its_kink(bench, best, noise, len(before))

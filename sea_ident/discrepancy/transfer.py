@@ -127,7 +127,7 @@ class _Trial:
             fits = (self._bench.refine(m, self._now.noise, start=start, only=only, known=known) for m in models)
             return min(fits, key=lambda each: each.statistic)
 
-        own = self._signal() or self._history([self._position])
+        own = self._signal() or self._history([self._position], others)
         without, fixed = least(), least(own, as_known(self._bench, self._fit, [self._position]))
         if not self._tells(without, min(self._now.fit.statistic, fixed.statistic)):
             return 0.0
@@ -156,9 +156,12 @@ class _Trial:
     def _signal(self) -> list[Effect]:
         return [self._effect] if isinstance(self._effect, SignalEffect) else []
 
-    def _history(self, positions: Sequence[int]) -> list[Effect]:
-        """The constants that dry friction in springs keeps of the time before, for some effects."""
+    def _history(self, positions: Sequence[int], beside: Sequence[Effect] = ()) -> list[Effect]:
+        """The constants that dry friction in springs keeps of the time before, for some effects.
+
+        Not where such a constant is what is tried, or is there already.
+        """
         effects = self._fit.effects
         joints = [effects[p].joint for p in positions if isinstance(effects[p], SpringHysteresis)]
-        present = {effect_key(effect) for effect in effects}
-        return [offset for joint in joints if effect_key(offset := SpringOffset(joint)) not in present]
+        there = {effect_key(effect) for effect in (self._effect, *beside)}
+        return [offset for joint in joints if effect_key(offset := SpringOffset(joint)) not in there]

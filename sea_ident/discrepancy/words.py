@@ -108,6 +108,14 @@ def told_by_the_other_motion(joint: str) -> str:
     )
 
 
+def at_rest(joint: str) -> str:
+    """That a constant in a spring is where its dry friction rests."""
+    return (
+        f"the spring of {joint!r} has a constant torque beside its dry friction, which may rest anywhere, depending on "
+        "how it was loaded before: the repaired model has it as spring_offset, and it is no effect of its own"
+    )
+
+
 def stiction(found: Breakaway, unit: str) -> str:
     """That the passes show a motor to be let go later than it slides, and by how much."""
     return (

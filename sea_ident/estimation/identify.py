@@ -126,7 +126,7 @@ def identify(
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
     found.extend(check_signs(observations))
-    steps = repeated_steps(observations, how, estimate)
+    steps = repeated_steps(observations, how)
     model = _model(observations, estimate, uncertainty if steps is None else steps.widened(uncertainty), how.name)
     if prior is not None:
         model = _refitted(updated(model, prior), observations)

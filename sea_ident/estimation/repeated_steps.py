@@ -7,18 +7,22 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import JointEffect
-from sea_ident.estimation.estimators import Estimate, Estimator
+from sea_ident.estimation.estimators import Estimator
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm
 from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
+from sea_ident.processing.harmonics import FEWEST_PERIODS
 
 DRAWS = 8
 """Other places of the steps for which everything is estimated again."""
 
 SEED = 1
+
+FEW = FEWEST_PERIODS
+"""Periods in which that is done: the same error is in all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +33,7 @@ class RepeatedSteps:
     both the scatter of the changes and their mean, as the errors act by their squares.
 
     Attributes:
-        again: (K,) the data with the errors added.
+        again: (K,) some periods of the data with the errors added.
         moves: (K, b) by how much the base parameters change.
         text: what a user should know.
     """
@@ -72,13 +76,12 @@ class RepeatedSteps:
         )
 
 
-def repeated_steps(observations: Observations, how: Estimator, estimate: Estimate) -> RepeatedSteps | None:
+def repeated_steps(observations: Observations, how: Estimator) -> RepeatedSteps | None:
     """Estimate again with other errors of the encoders.
 
     Args:
         observations: the data.
         how: the estimator.
-        estimate: what it found.
 
     Returns:
         What changes; None where all steps average out.
@@ -91,16 +94,30 @@ def repeated_steps(observations: Observations, how: Estimator, estimate: Estimat
     if steps is None or period is None:
         return None
     rng = np.random.default_rng(SEED)
-    again = tuple(
-        replace(observations, processed=_with_error(observations.processed, period, rng)) for _ in range(DRAWS)
-    )
-    moves = np.stack([how.estimate(each).values - estimate.values for each in again])
+    few = _few_periods(observations.processed)
+    again = tuple(replace(observations, processed=_with_error(few, period, rng)) for _ in range(DRAWS))
+    without = how.estimate(replace(observations, processed=few)).values
+    moves = np.stack([how.estimate(each).values - without for each in again])
     text = (
         f"{observations.processed.source}: encoder steps do not average out, as they repeat in every period: "
         f"{steps.words(observations.robot.joint_names)}. Standard deviations count what such errors change. Finer "
         "encoders, or motion that differs a little from period to period, make them smaller"
     )
     return RepeatedSteps(again, moves, text)
+
+
+def _few_periods(processed: ProcessedRecording) -> ProcessedRecording:
+    """The recording with its mean as it is, and beside it some periods alone, spread over it."""
+    if processed.periods <= FEW:
+        return processed
+    kept = np.linspace(0, processed.periods - 1, FEW).astype(int)
+    return replace(
+        processed,
+        periods=FEW,
+        period_motions=tuple(processed.period_motions[p] for p in kept),
+        period_tau_motor=processed.period_tau_motor[kept],
+        places=tuple(processed.places[p] for p in kept),
+    )
 
 
 def _with_error(processed: ProcessedRecording, period: float, rng: np.random.Generator) -> ProcessedRecording:

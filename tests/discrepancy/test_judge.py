@@ -55,18 +55,20 @@ def test_dry_friction_in_a_spring_has_no_sign_where_it_sticks(nothing_missing, s
 
 
 @pytest.mark.parametrize(
-    ("shares", "drifting", "out"),
+    ("shares", "drifting", "at_rest", "out"),
     [
-        ([0.9, 0.8], 0, []),
-        ([0.9, 0.2, -1.0], 0, [1, 2]),  # the form of what holds
-        ([0.15, -2.5, -0.4], 0, [1]),  # nothing holds: the worst spoils the others
-        ([0.15, -0.4], 1, [0, 1]),  # what drifts is left
-        ([-0.4], 0, []),  # nothing would be left
+        ([0.9, 0.8], 0, (), []),
+        ([0.9, 0.2, -1.0], 0, (), [1, 2]),  # the form of what holds
+        ([0.15, -2.5, -0.4], 0, (), [1]),  # nothing holds: the worst spoils the others
+        ([0.15, -0.4], 1, (), [0, 1]),  # what drifts is left
+        ([-0.4], 0, (), []),  # nothing would be left
+        ([0.9, -4.0, 0.2], 0, (1,), [2]),  # dry friction rests elsewhere
+        ([-0.4, -4.0], 0, (1,), []),  # nothing that has a name would be left
     ],
 )
-def test_what_does_not_hold_goes_and_where_nothing_holds_the_worst(shares, drifting, out):
+def test_what_does_not_hold_goes_and_where_nothing_holds_the_worst(shares, drifting, at_rest, out):
     transfers = [SimpleNamespace(share=share, holds=share > 0.5) for share in shares]
-    assert _out(SimpleNamespace(transfers=transfers), drifting) == out
+    assert _out(SimpleNamespace(transfers=transfers), drifting, at_rest) == out
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.1, 2.0])

@@ -150,3 +150,20 @@ def test_play_that_is_fitted_is_held_against_play_that_is_never_closed(rippled, 
         refitted(bench, start.fit.effects, effect, (), start.noise, start.fit.parameters)
     (fit,) = asked
     assert fit.effects[-1].name == "backlash"
+
+
+@pytest.mark.parametrize("times", [3.0, 1.0 / 3.0])
+def test_of_two_elements_that_slip_the_one_is_not_taken_for_the_other(laboratory, times):
+    slip = 0.0015
+    bench = laboratory.bench(laboratory.record([("spring_hysteresis", "hip", [1.0, 3.0], {"slip": slip})]))
+    start = settle(bench, bench.effects)
+    begun = make_effect("spring_hysteresis", "hip", slip=times * slip)
+    fit = refitted(bench, bench.effects, begun, (), start.noise, start.fit.parameters)
+    std = slip * fit.std(len(fit.values) + len(fit.free_shapes) - 1)
+    assert fit.effects[-1].slip == pytest.approx(slip, abs=4.0 * std)
+    assert std < 0.02 * slip
+    assert (
+        fit.statistic
+        < EQUALLY_GOOD
+        + bench.fit((*bench.effects, replace(begun, slip=slip)), start.noise, start=start.fit.parameters).statistic
+    )
