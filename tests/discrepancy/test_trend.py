@@ -38,6 +38,14 @@ def softening(laboratory):
     return bench, settle(bench, bench.effects)
 
 
+@pytest.mark.parametrize(("drift", "seen", "named"), [(0.15, 1e-3, []), (0.25, 1e-4, ["friction_drift"])])
+def test_a_trend_that_one_recording_in_a_thousand_shows_by_chance_has_no_name(laboratory, drift, seen, named):
+    found = compared(laboratory.bench(laboratory.record([("friction_drift", "knee", [0.0, drift], {})], periods=12)))
+    assert 0.0 < found.p_value < seen
+    assert [trend.effect.name for trend in found.trends] == named
+    assert not found.unnamed
+
+
 def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
     assert opposite.p_value < 1e-6
     assert not opposite.unnamed
