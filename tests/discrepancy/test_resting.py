@@ -13,7 +13,6 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
-from tests.discrepancy.conftest import Laboratory
 
 JOINT = "knee"
 HERE, THERE = -0.5, -0.15
@@ -21,9 +20,9 @@ AMOUNTS, SLIP = [0.3, 0.6], 0.002
 
 
 @pytest.fixture(scope="module")
-def upright(leg, series):
+def upright(laboratory, series):
     """The leg swings about the vertical: springs are deflected to either side, and a constant in them is seen."""
-    return Laboratory(leg, tuple(replace(each, offset=np.zeros_like(each.offset)) for each in series))
+    return replace(laboratory, motions=tuple(replace(each, offset=np.zeros_like(each.offset)) for each in series))
 
 
 def recorded(upright, value, motion):
@@ -78,10 +77,8 @@ def test_what_is_called_an_offset_of_an_encoder_is_where_the_friction_rests(upri
     assert left == {position + 1: ()}
     assert resting(now, again) == (0,)
     assert again.transfers[1].holds
-    fit = now.final.fit
-    assert abs(fit.values[sum(used.counts(fit.effects)[:position])] - HERE) < 4.0 * fit.std(
-        sum(used.counts(fit.effects)[:position])
-    )
+    fit, place = now.final.fit, sum(used.counts(now.final.fit.effects)[:position])
+    assert abs(fit.values[place] - HERE) < 4.0 * fit.std(place)
 
 
 def test_what_is_called_so_and_is_the_same_on_the_other_motion_is_an_effect(upright, used, called_an_encoder):
