@@ -232,7 +232,7 @@ def _tested(
     held, notes = held_out(bench, confirmed.selection, holdout)
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
-    constant, slipped = (_joints_of(kind, confirmed.selection) for kind in (SpringOffset, SpringHysteresis))
+    constant, slipping = (confirmed.selection.joints_of(kind) for kind in (SpringOffset, SpringHysteresis))
     if alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
@@ -245,7 +245,7 @@ def _tested(
         selection, alternatives = _with_alternatives(bench, left if other is None else other.selection)
         selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
         confirmed = (other or confirmed).less(selection)
-    read_there = _joints_of(SpringHysteresis, confirmed.selection) & constant - slipped
+    read_there = confirmed.selection.joints_of(SpringHysteresis) & (constant - slipping)
     told = tuple(words.told_by_the_other_motion(joint) for joint in sorted(read_there))
     return confirmed, alternatives, held, (*notes, *told)
 
@@ -260,11 +260,6 @@ def _searched_beside(bench: Bench, left: Selection, ruled_out: set[Key]) -> Conf
         return None
     found = confirm(bench, search(bench, bench.effects, left, ruled_out))
     return found if found.selection.added > left.added else None
-
-
-def _joints_of(kind: type[SpringOffset | SpringHysteresis], selection: Selection) -> set[str]:
-    """Joints in whose spring an effect of this kind was added."""
-    return {effect.required_joint for effect in selection.effects if isinstance(effect, kind)}
 
 
 def _out(held: HeldOut, drifting: int, at_rest: Collection[int]) -> list[int]:

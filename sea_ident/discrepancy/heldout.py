@@ -1,7 +1,7 @@
 """Data that were not used in the fit: another recording, or where none was given, every other period."""
 
 import warnings as python_warnings
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -155,7 +155,9 @@ def other_periods(bench: Bench, selection: Selection) -> HeldOut | None:
 def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     """A selection on data that it was not fitted to."""
     start = selection.start.fit
-    before = without_history(other, other.predicted(start.effects, start.parameters), _remembering(selection))
+    before = without_history(
+        other, other.predicted(start.effects, start.parameters), selection.joints_of(SpringHysteresis)
+    )
     after, now = _fitted_anew(other, selection)
     transfers = tuple(transfer(other, selection, now)) if selection.added else ()
     return HeldOut(other, before, after, other.noise(after), transfers, source)
@@ -164,15 +166,13 @@ def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
 def _fitted_anew(other: Bench, selection: Selection) -> tuple[Fit, Settled]:
     """What was found on data that it was not fitted to: with its parameters as they are, and fitted to them."""
     final = selection.final.fit
-    after = without_history(other, other.predicted(final.effects, final.parameters), _remembering(selection))
+    after = without_history(
+        other, other.predicted(final.effects, final.parameters), selection.joints_of(SpringHysteresis)
+    )
     return after, settle_again(other, after)
 
 
-def _remembering(selection: Selection) -> list[str]:
-    return [effect.required_joint for effect in selection.effects if isinstance(effect, SpringHysteresis)]
-
-
-def without_history(bench: Bench, fit: Fit, joints: Sequence[str]) -> Fit:
+def without_history(bench: Bench, fit: Fit, joints: Collection[str]) -> Fit:
     """A model with given parameters less what springs with dry friction may remember of the time before.
 
     Where such a spring rests depends on how it was loaded last: a constant that no periodic motion tells, and none
@@ -188,7 +188,9 @@ def without_history(bench: Bench, fit: Fit, joints: Sequence[str]) -> Fit:
     """
     if not joints:
         return fit
-    columns = np.concatenate([bench.column_spectra(SpringOffset(joint), fit.effects) for joint in joints], axis=2)
+    columns = np.concatenate(
+        [bench.column_spectra(SpringOffset(joint), fit.effects) for joint in sorted(joints)], axis=2
+    )
     amounts = np.linalg.lstsq(stacked(columns), stacked(fit.residual), rcond=None)[0]
     residual = fit.residual - columns @ amounts
     return replace(fit, residual=residual, whitened=stacked(residual))

@@ -19,7 +19,6 @@ from sea_ident.effects.backlash import NEARLY_HARD, Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
-from sea_ident.effects.spring_hysteresis import WIDER, SpringHysteresis
 
 LARGE_AMOUNT = 0.1
 """Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
@@ -69,13 +68,7 @@ def refitted(
     Returns:
         The fit.
     """
-    begun = [effect]
-    if isinstance(effect, SignalEffect) and effect.beginnings:
-        first = effect.amounts[0].name
-        begun.extend(replace(effect, **{first: value}) for value in effect.beginnings)  # type: ignore[arg-type]
-    if isinstance(effect, SpringHysteresis):
-        # the first of its elements may have been put where the second one is
-        begun.append(replace(effect, slip=effect.slip / WIDER))
+    begun = [effect, *effect.beginnings()]
     if isinstance(effect, Backlash):
         begun.append(_softened(bench, before, effect, after, noise, start))
     if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.amounts):
@@ -84,7 +77,7 @@ def refitted(
     fits: list[Fit] = []
     for each in begun:
         model = (*before, each, *after)
-        later = bool(fits) and isinstance(each, SignalEffect | SpringHysteresis)
+        later = bool(fits) and not isinstance(each, Backlash)
         if later and bench.fit(model, noise, start=start, tangents=False).statistic > NO_BEGINNING * fits[0].statistic:
             continue
         if isinstance(each, ExternalForce):

@@ -28,7 +28,7 @@ def resting(selection: Selection, held: HeldOut | None) -> tuple[int, ...]:
     Returns:
         Positions among the effects that were added.
     """
-    slipping = {effect.joint for effect in selection.effects if isinstance(effect, SpringHysteresis)}
+    slipping = selection.joints_of(SpringHysteresis)
     return tuple(
         k
         for k, effect in enumerate(selection.effects)
@@ -51,7 +51,7 @@ def with_constants_at_rest(
         The selection with such constants, what else each effect that is named could be, and what the selection is worth
         on the data that were not used.
     """
-    slipping = {effect.joint for effect in selection.effects if isinstance(effect, SpringHysteresis)}
+    slipping = selection.joints_of(SpringHysteresis)
     first = len(selection.final.fit.effects) - selection.added
     left, changed = dict(alternatives), False
     for position, others in alternatives.items():

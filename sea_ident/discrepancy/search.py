@@ -32,7 +32,7 @@ from sea_ident.discrepancy.next_effect import (
 )
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, JointEffect
 from sea_ident.effects.external_force import ExternalForce
 
 MOST_EFFECTS = 6
@@ -82,6 +82,10 @@ class Selection:
         """The effects added."""
         effects = self.final.fit.effects
         return effects[len(effects) - self.added :] if self.added else ()
+
+    def joints_of(self, kind: type[JointEffect]) -> set[str]:
+        """Joints at which an effect of this kind was added."""
+        return {effect.required_joint for effect in self.effects if isinstance(effect, kind)}
 
 
 def search(

@@ -310,6 +310,13 @@ class Effect(ABC):
         """
         return None
 
+    def beginnings(self) -> tuple[Self, ...]:
+        """The same effect with other shapes or amounts, from which a fit begins too; by default none.
+
+        For where the fit from these may lead astray.
+        """
+        return ()
+
     def anchored(self, anchor: Anchor) -> Self:
         """The same effect, knowing what it needs of the rest of the model; by default it needs nothing."""
         return self

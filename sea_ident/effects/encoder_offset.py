@@ -1,7 +1,7 @@
 """A wrong zero of the link encoder."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
@@ -25,8 +25,10 @@ class EncoderOffset(SignalEffect):
     name: ClassVar[str] = "encoder_offset"
     source: ClassVar[str] = "Hollerbach, Khalil, Gautier, Model identification, Springer Handbook of Robotics, 2008"
     amounts: ClassVar[tuple[Shape, ...]] = (Shape("offset", "rad", -0.5, 0.5, logarithmic=False),)
-    # a stiffening spring bends the derivative at zero
-    beginnings: ClassVar[tuple[float, ...]] = (-0.01, 0.01)
+
+    def beginnings(self) -> tuple["EncoderOffset", ...]:
+        """To either side: a stiffening spring bends the derivative at zero."""
+        return tuple(replace(self, offset=offset) for offset in (-0.01, 0.01))
 
     def corrected(self, robot: Robot, motion: Motion) -> Motion:
         """Q without the offset."""

@@ -27,8 +27,6 @@ class SignalEffect(Effect):
 
     side: ClassVar[Side] = Side.SENSOR
     amounts: ClassVar[tuple[Shape, ...]]
-    beginnings: ClassVar[tuple[float, ...]] = ()
-    """Values of the first amount from which a search begins too, where the derivative at zero may lead astray."""
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """None: its amounts are attributes."""

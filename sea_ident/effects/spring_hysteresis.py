@@ -51,6 +51,10 @@ class SpringHysteresis(OneWayEffect):
         """Widths within the deflections of this motion."""
         return tuple(replace(self, slip=width) for width in deflections(state, self.required_joint, 40))
 
+    def beginnings(self) -> tuple["SpringHysteresis", ...]:
+        """The first element may have been put where the second one is."""
+        return (replace(self, slip=self.slip / WIDER),)
+
     @property
     def slips(self) -> FloatArray:
         """(2,) deflection at which each element slips [rad] or [m]."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.synthetic import record
-from sea_ident.estimation import identify
+from sea_ident.estimation import identify, repeated_steps
 from sea_ident.processing import process
 from sea_ident.processing.encoder_steps import step_of
 from sea_ident.processing.harmonics import within
@@ -47,6 +47,20 @@ def test_steps_that_repeat_are_told_and_counted(leg, truth):
         assert np.all(model.std > np.sqrt(np.diag(model.uncertainty.repeatability)))
     # nine intervals of 95 %: three or more outside are chance in one case of a hundred
     assert sum(outside) <= 2
+
+
+def test_what_steps_change_is_seen_in_a_few_periods(leg, truth, monkeypatch):
+    """The same errors in all periods change the estimate by the same."""
+    processed = process(rounded(leg, truth, 0, STEP), leg, period=10.0)
+    assert processed.periods > repeated_steps.FEW
+    few = identify(leg, processed)
+    monkeypatch.setattr(repeated_steps, "FEW", processed.periods)
+    whole = identify(leg, processed)
+    more = [np.diag(m.uncertainty.covariance - m.uncertainty.repeatability) for m in (few, whole)]
+    assert np.all(more[1] > 0.0)
+    np.testing.assert_allclose(np.sqrt(more[0]), np.sqrt(more[1]), rtol=0.1)
+    known = [[s.stiffness_std for s in m.springs] for m in (few, whole)]
+    np.testing.assert_allclose(*known, rtol=0.1)
 
 
 def test_steps_below_the_noise_average_out(leg, truth):
