@@ -9,9 +9,9 @@ from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import significance, torque_change
+from sea_ident.discrepancy.judge import flat_steps, scatter_p, significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SCATTER_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
@@ -63,7 +63,9 @@ class Confirmed:
 def confirm(bench: Bench, selection: Selection) -> Confirmed:
     """Take out the effects that only the samples near reversals speak for.
 
-    Stiction stays that every pass shows where its motor is let go.
+    What the others say must stand out of the scatter of the periods as well: friction that differs from pass to pass
+    does so beyond the samples that are left out, and has another mean over the passes of every recording. Stiction
+    stays that every pass shows where its motor is let go.
 
     Args:
         bench: the recording.
@@ -74,7 +76,10 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     """
     away = bench.comparing(replace(away_from_reversals(bench.data), alike=BARELY_SEEN))
     start = settle_again(away, selection.start.fit)
-    final = settle_again(away, selection.final.fit) if selection.added else start
+    if not selection.added:
+        return Confirmed(selection, away, start, start)
+    final = settle_again(away, selection.final.fit)
+    steps = flat_steps(away, final)
     weak = []
     first = len(final.fit.effects) - selection.added
     for k in range(selection.added):
@@ -83,7 +88,8 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         loss = less.statistic - final.fit.statistic
         columns = max(len(final.fit.effects[first + k].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
-        if p_value > FAMILY_LEVEL or torque_change(away, final.fit, less) < SMALLEST_SHARE:
+        by_chance = p_value > FAMILY_LEVEL or scatter_p(steps, less.whitened - final.fit.whitened) > SCATTER_LEVEL
+        if by_chance or torque_change(away, final.fit, less) < SMALLEST_SHARE:
             rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
             if not lets_go_late(bench, rest, final.fit.effects[first + k]):
                 weak.append(k)

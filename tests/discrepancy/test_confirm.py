@@ -9,9 +9,12 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.confirm import Confirmed, _begun, confirm
 from sea_ident.discrepancy.data import BARELY_SEEN, around_reversals, away_from_reversals
+from sea_ident.discrepancy.judge import significance, torque_change
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
+from sea_ident.simulation import FrictionJitter
 
 RIPPLE = make_effect("torque_ripple", "hip", order=4.0)
 AT_REVERSALS = make_effect("stribeck_friction", "knee", speed=0.05, exponent=2.0)
@@ -57,6 +60,22 @@ def test_what_is_seen_only_near_reversals_is_dropped(both):
     assert [e.name for e in found.final.fit.effects[-1:]] == ["torque_ripple"]
     assert found.bench.data.caution == 2
     assert found.bench.data.alike == BARELY_SEEN
+
+
+def test_what_does_not_stand_out_of_the_scatter_of_the_passes_is_dropped(laboratory):
+    """Friction that differs from pass to pass far beyond the samples that are left out: the mean of twelve shows it."""
+    recording = laboratory.record([], periods=12, seed=1, jitter=FrictionJitter(spread=1.0, speed=0.3))
+    bench = laboratory.bench(recording)
+    friction = make_effect("nonlinear_viscous_friction", "ankle", exponent=0.4)
+    selection = replace(selected(bench, [friction]), tests=1)
+    found = confirm(bench, selection)
+    assert found.selection.added == 0
+    # nothing else speaks against it: it is beyond the noise floor, and large enough
+    with_it = settle_again(found.bench, selection.final.fit)
+    fit = with_it.fit
+    less = found.bench.refine(fit.effects[:-1], with_it.noise, start=fit.parameters, only=len(bench.effects))
+    assert significance(less.statistic - fit.statistic, 1, 1, less, with_it.noise) < 0.1 * FAMILY_LEVEL
+    assert torque_change(found.bench, fit, less) > 2.0 * SMALLEST_SHARE
 
 
 def test_what_holds_elsewhere_stays_with_its_size(rippled):
