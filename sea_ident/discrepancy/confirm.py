@@ -11,7 +11,7 @@ from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import flat_steps, scatter_p, significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SCATTER_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
@@ -88,8 +88,8 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         loss = less.statistic - final.fit.statistic
         columns = max(len(final.fit.effects[first + k].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
-        by_chance = p_value > FAMILY_LEVEL or scatter_p(steps, less.whitened - final.fit.whitened) > SCATTER_LEVEL
-        if by_chance or torque_change(away, final.fit, less) < SMALLEST_SHARE:
+        by_chance = max(p_value, scatter_p(steps, less.whitened - final.fit.whitened))
+        if by_chance > FAMILY_LEVEL or torque_change(away, final.fit, less) < SMALLEST_SHARE:
             rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
             if not lets_go_late(bench, rest, final.fit.effects[first + k]):
                 weak.append(k)

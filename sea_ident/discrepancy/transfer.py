@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.contribution import as_known
@@ -25,19 +23,14 @@ TRANSFERS = 0.5
 TRANSFERS_ALONE = 0.7
 """... and the same where nothing else is missing that could spoil it: then it holds in part only."""
 
-SHOWS = 0.5
-"""Share of what an effect would explain of other data, were it as found, that is there at least, chance and its own
-uncertainty aside: where that much would be seen and nothing is, it is absent."""
-
 
 @dataclass(frozen=True)
 class Transfer:
     """How an effect does on data that were not used.
 
     Attributes:
-        share: of what it could explain there, what it does explain with its parameters as they are [-]; where it is
-            absent, of what it would explain if it were there.
-        tested: whether there was enough to explain to tell, or would be.
+        share: of what it could explain there, what it does explain with its parameters as they are [-].
+        tested: whether there was enough to explain to tell.
         statistic: weighted sum of squares that is left there with its parameters as they are.
         excess: what of it is beyond the noise.
         unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
@@ -117,12 +110,8 @@ class _Trial:
 
         free = self._now.fit if self._others else alone()
         share, tested = self._share(without, fixed, free), self._tells(without, min(free.statistic, fixed.statistic))
-        expected = float(np.sum((without.whitened - fixed.whitened) ** 2))
-        absent = not tested and self._tells(without, without.statistic - SHOWS * expected)
-        if absent:
-            share, tested = (without.statistic - fixed.statistic) / expected, True
         if tested and self._others and share <= TRANSFERS:
-            if not absent and fixed.statistic - without.statistic < EQUALLY_GOOD * unit:
+            if fixed.statistic - without.statistic < EQUALLY_GOOD * unit:
                 # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
                 tested = self._tells(without, alone().statistic)
             share = max(share, self._share_beside_free())

@@ -1,7 +1,5 @@
 """Whether an effect holds on another motion: what it is worth there, and what is not its own fault."""
 
-import pytest
-
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
@@ -57,15 +55,6 @@ def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
     assert hip.holds
     assert knee.tested
     assert not knee.holds
-
-
-@pytest.mark.parametrize(("found", "tested"), [(0.2, True), (0.05, False)])
-def test_what_is_absent_from_another_motion_does_not_hold_where_it_would_be_seen(laboratory, found, tested):
-    hip, knee = transfers_of(laboratory, ripples(0.4, found), ripples(0.4, 0.0))
-    assert hip.tested
-    assert hip.holds
-    assert knee.tested == tested
-    assert knee.holds == (not tested)
 
 
 def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect(laboratory):
