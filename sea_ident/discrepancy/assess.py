@@ -124,7 +124,7 @@ def detectability(
     steps = flat_steps(*judged) if judged[0].data.periods > 1 else np.zeros((0, 0))
     candidates = [c for c in candidates if np.any(c.directions)]
     bases = [_orthonormal(c.directions) for c in candidates]
-    labels = [_label(c) for c in candidates]
+    labels = [c.effect.title for c in candidates]
     stack = np.concatenate([b for b in bases], axis=1) if bases else np.zeros((len(fit.whitened), 0))
     gram = stack.T @ stack
     starts = np.concatenate([[0], np.cumsum([b.shape[1] for b in bases])]).astype(int)
@@ -212,11 +212,6 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
     left, strength, _ = svd(columns)
     kept: FloatArray = left[:, strength > 1e-6 * max(float(strength.max(initial=0.0)), 1e-300)]
     return kept if np.any(strength > 0.0) else kept[:, :0]
-
-
-def _label(candidate: Candidate) -> str:
-    effect = candidate.effect
-    return effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
 
 
 def _unit(bench: Bench, effect: Effect, column: int) -> str:

@@ -16,6 +16,7 @@ from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import Effect
+from sea_ident.effects.base import titled
 
 BASIC = ("coulomb_friction", "viscous_friction", "torque_offset")
 """Terms of every drive."""
@@ -90,7 +91,7 @@ def completed(bench: Bench) -> Completed | None:
         now = Settled(new, bench.noise(new))
         now = Settled(bench.fit(new.effects, now.noise, start=new.parameters), now.noise)
         p_values.append(p_value)
-        names.append(f"{candidate.effect.name} at {candidate.effect.joint}")
+        names.append(candidate.effect.title)
         done = (candidate.effect.name, candidate.effect.joint)
         wanted = [effect for effect in wanted if (effect.name, effect.joint) != done]
     if not p_values:
@@ -99,7 +100,7 @@ def completed(bench: Bench) -> Completed | None:
     tests = max(sum(c.tests for c in candidates), 1)
     selection = Selection(start, now, len(p_values), tuple(p_values), candidates, tests)
     warnings = (
-        f"the model had no {', '.join(f'{name} at {joint}' for name, joint in lacking)}: the basic terms that the data "
+        f"the model had no {', '.join(titled(*each) for each in lacking)}: the basic terms that the data "
         f"ask for ({', '.join(names)}) were added before anything finer was looked for; diagnose the completed model",
         *_same(bench, selection),
     )

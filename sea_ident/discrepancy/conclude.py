@@ -182,8 +182,7 @@ def unexplained(confirmed: Confirmed) -> bool:
 
 def explains(training: Gap, held: Gap) -> bool:
     """Whether a gap that goes on one recording goes on the other too, where it is far beyond the noise."""
-    left, noise = (float(np.linalg.norm(list(part.values()))) for part in (held.after, held.noise))
-    return left < FAR_BEYOND * noise or training.shrink < GOES or held.shrink > STAYS * training.shrink
+    return held.within_noise(FAR_BEYOND) or training.shrink < GOES or held.shrink > STAYS * training.shrink
 
 
 def predicts(held: Gap, torque: Mapping[str, float]) -> bool:

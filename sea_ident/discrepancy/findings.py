@@ -13,6 +13,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.atomic import atomic_file
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Effect
+from sea_ident.effects.base import titled
 from sea_ident.effects.signal import SignalEffect
 
 
@@ -123,11 +124,7 @@ class Alternative:
     @property
     def title(self) -> str:
         """Name and joint."""
-        return _at(self.effect, self.joint)
-
-
-def _at(effect: str, joint: str | None) -> str:
-    return effect if joint is None else f"{effect} at {joint}"
+        return titled(self.effect, self.joint)
 
 
 TIMES = 1.0
@@ -166,7 +163,7 @@ class MissingEffect:
         """Name and joint; with what tells it from another of its kind at the joint."""
         if self.detail is not None:
             return self.detail.title
-        return _at(self.effect, self.joint)
+        return titled(self.effect, self.joint)
 
     @property
     def extent(self) -> str:
@@ -214,6 +211,11 @@ class Gap:
     def mixed(self) -> bool:
         """Whether the units of joints differ."""
         return len({self.units.get(joint) for joint in self.before}) > 1
+
+    def within_noise(self, times: float = 1.0) -> bool:
+        """Whether what is left over all joints is less than some times the noise, each as for `shrink`."""
+        left, noise = (float(np.linalg.norm(self._comparable(part))) for part in (self.after, self.noise))
+        return left < times * noise
 
     def _comparable(self, sizes: Mapping[str, float]) -> FloatArray:
         """(n,) sizes of one unit."""

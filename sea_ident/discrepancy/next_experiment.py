@@ -74,7 +74,7 @@ class Pair:
     @property
     def names(self) -> tuple[str, str]:
         """Both, as `name at joint`."""
-        return _label(self.own.effects[self.own_position]), _label(self.rival.effects[self.rival_position])
+        return self.own.effects[self.own_position].title, self.rival.effects[self.rival_position].title
 
 
 def ambiguous_pairs(selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]) -> list[Pair]:
@@ -248,10 +248,6 @@ def _data_of(data: PeriodData, robot: Robot, series: FourierSeries, motors: Pred
         left_out=around_reversals(motion, data.equations),
         known=None,
     )
-
-
-def _label(effect: Effect) -> str:
-    return effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
 
 
 def with_next_experiment(

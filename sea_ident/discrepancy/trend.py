@@ -258,11 +258,10 @@ def _apart(first: FloatArray, later: FloatArray) -> float:
 
 def _over_too_soon(bench: Bench, trend: Trend) -> str:
     effect = trend.effect
-    place = effect.name if effect.joint is None else f"{effect.name} at {effect.joint}"
     return (
-        f"{bench.data.source}: the first periods differ as {place} would make them, but it is over so soon (within "
-        f"about {getattr(effect, 'time_constant', 0.0):.2g} s) that its rate is not known: it is not named. Record "
-        "more periods from the same start, or start recording later"
+        f"{bench.data.source}: the first periods differ as {effect.title} would make them, but it is over so soon "
+        f"(within about {getattr(effect, 'time_constant', 0.0):.2g} s) that its rate is not known: it is not named. "
+        "Record more periods from the same start, or start recording later"
     )
 
 

@@ -349,7 +349,7 @@ class Effect(ABC):
     @property
     def title(self) -> str:
         """Name and joint, for people, and what tells it from another of its kind there."""
-        return self.name if self.joint is None else f"{self.name} at {self.joint}"
+        return titled(self.name, self.joint)
 
     @property
     def shape_values(self) -> dict[str, float]:
@@ -399,6 +399,11 @@ class JointEffect(Effect):
         """Units of torque and of position of its joint: (N m, rad) or (N, m)."""
         joint = robot.joints[robot.index(self.required_joint)]
         return joint.torque_unit, joint.position_unit
+
+
+def titled(name: str, joint: str | None) -> str:
+    """Name of an effect with its joint, for people."""
+    return name if joint is None else f"{name} at {joint}"
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

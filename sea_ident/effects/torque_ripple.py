@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, JointEffect, Shape, Side, State
+from sea_ident.effects.base import Column, JointEffect, Shape, Side, State, titled
 from sea_ident.effects.orders import orders
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -69,4 +69,4 @@ class TorqueRipple(JointEffect):
     @property
     def title(self) -> str:
         """With its number from the second one on."""
-        return super().title if self.number == 1 else f"{self.name} {self.number} at {self.joint}"
+        return titled(self.name if self.number == 1 else f"{self.name} {self.number}", self.joint)

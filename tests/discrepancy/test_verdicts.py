@@ -193,6 +193,16 @@ def test_what_is_found_must_explain_other_data_too(train, held, noise, expected)
     assert explains(*gaps) is expected
 
 
+def test_a_slide_of_large_forces_does_not_hide_what_a_joint_leaves():
+    """Each in units of its noise: the slide is at half of it, the joint at ten times its own."""
+    units, noise = {"slide": "N", "hip": "N m"}, {"slide": 10.0, "hip": 0.1}
+    training = Gap({"slide": 8.0, "hip": 2.0}, {"slide": 5.0, "hip": 0.0}, noise, units)
+    held = Gap({"slide": 5.0, "hip": 1.0}, {"slide": 5.0, "hip": 1.0}, noise, units)
+    assert not explains(training, held)
+    assert explains(training, replace(held, units={}))
+    assert explains(training, replace(held, after={"slide": 5.0, "hip": 0.3}))
+
+
 def test_an_error_of_an_encoder_is_said_in_its_own_unit():
     """What it does to the torque is mostly taken up by the spring, and can be many times the torque."""
     shift = MissingParameter("knee.encoder_offset_offset", -0.0026, 1e-5, "rad")
