@@ -203,7 +203,13 @@ def _offset(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untype
 
 def _saturation(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
     c = p.size
-    hooks[i].drive = lambda s, u: u - c * u * u * u
+    top = (3.0 * c) ** -0.5  # where the curve is flat; what is asked for before all has settled may be far beyond
+
+    def saturated(s, u):  # type: ignore[no-untyped-def]
+        u = min(max(u, -top), top)
+        return u - c * u * u * u
+
+    hooks[i].drive = saturated
 
 
 def _saturation_tanh(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
