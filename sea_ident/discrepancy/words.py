@@ -76,7 +76,7 @@ def paragraph(facts: Facts) -> str:
             parts.append(_gap_sentence(facts.gap, facts.units))
             if facts.held is not None:
                 parts.append(_held_sentence(facts))
-    if facts.remainder > 0.0:
+    if facts.remainder > 0.0 and facts.verdict is not Verdict.NONE:
         parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
     if facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
         parts.append(f"{_not_compared(facts, facts.standing)}.")
@@ -217,6 +217,12 @@ def _part(facts: Facts) -> float | None:
 def _opening(facts: Facts) -> str:
     names = ", ".join(f"{m.title} ({m.extent})" for m in facts.missing)
     match facts.verdict:
+        case Verdict.NONE if facts.remainder > 0.0:
+            return (
+                f"Nothing is missing that would matter: model and data disagree beyond the noise (p "
+                f"{chance(facts.p_value)}), but by {_percent(facts.remainder)} of the torque, and no effect explains "
+                "enough of that to be named."
+            )
         case Verdict.NONE:
             return (
                 f"Nothing is missing that {facts.periods} periods could show (lack of fit p {chance(facts.p_value)})."

@@ -101,6 +101,16 @@ def test_no_probability_is_zero_and_no_percentage_a_power_of_ten():
     assert "A remainder of 0.42 % of" in paragraph(facts(Verdict.NAMED_WITH_REMAINDER, remainder=0.0042))
 
 
+def test_where_nothing_that_matters_is_missing_a_disagreement_is_said():
+    nothing = replace(facts(Verdict.NONE, p_value=0.3), missing=())
+    assert paragraph(nothing).startswith("Nothing is missing that 12 periods could show (lack of fit p = 0.3).")
+    told = paragraph(replace(nothing, p_value=0.0, remainder=0.0028))
+    assert told.startswith("Nothing is missing that would matter: model and data disagree beyond the noise (p < 1e-")
+    assert "by 0.28 % of the torque" in told
+    assert "could show" not in told
+    assert "remainder" not in told
+
+
 def test_of_what_drifts_no_gap_of_the_mean_is_told():
     drift = SimpleNamespace(effect=make_effect("torque_offset", "hip"))
     text = paragraph(facts(Verdict.NAMED, trends=(drift,)))
