@@ -155,9 +155,7 @@ def other_periods(bench: Bench, selection: Selection) -> HeldOut | None:
 def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     """A selection on data that it was not fitted to."""
     start = selection.start.fit
-    before = without_history(
-        other, other.predicted(start.effects, start.parameters), selection.joints_of(SpringHysteresis)
-    )
+    before = _as_found(other, start, selection)
     after, now = _fitted_anew(other, selection)
     transfers = tuple(transfer(other, selection, now)) if selection.added else ()
     return HeldOut(other, before, after, other.noise(after), transfers, source)
@@ -165,11 +163,13 @@ def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
 
 def _fitted_anew(other: Bench, selection: Selection) -> tuple[Fit, Settled]:
     """What was found on data that it was not fitted to: with its parameters as they are, and fitted to them."""
-    final = selection.final.fit
-    after = without_history(
-        other, other.predicted(final.effects, final.parameters), selection.joints_of(SpringHysteresis)
-    )
+    after = _as_found(other, selection.final.fit, selection)
     return after, settle_again(other, after)
+
+
+def _as_found(other: Bench, fit: Fit, selection: Selection) -> Fit:
+    """One of the models of a selection with its parameters as they are."""
+    return without_history(other, other.predicted(fit.effects, fit.parameters), selection.joints_of(SpringHysteresis))
 
 
 def without_history(bench: Bench, fit: Fit, joints: Collection[str]) -> Fit:

@@ -219,9 +219,8 @@ def _opening(facts: Facts) -> str:
     match facts.verdict:
         case Verdict.NONE if facts.remainder > 0.0:
             return (
-                f"Nothing is missing that would matter: model and data disagree beyond the noise (p "
-                f"{chance(facts.p_value)}), but by {_percent(facts.remainder)} of the torque, and no effect explains "
-                "enough of that to be named."
+                f"Nothing is named: model and data disagree beyond the noise (p {chance(facts.p_value)}) by "
+                f"{_percent(facts.remainder)} of the torque, and no effect explains enough of that."
             )
         case Verdict.NONE:
             return (
