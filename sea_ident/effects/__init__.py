@@ -14,18 +14,9 @@ from pkgutil import iter_modules
 from typing import Any
 
 from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import (
-    Anchor,
-    Column,
-    Contribution,
-    Effect,
-    JointEffect,
-    Shape,
-    Side,
-    State,
-    smooth_sign,
-)
+from sea_ident.effects.base import Anchor, Column, Effect, JointEffect, Shape, smooth_sign
 from sea_ident.effects.signal import corrected_motion, measured_signals
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

@@ -7,8 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape, State
+from sea_ident.effects.base import Column, Shape
 from sea_ident.effects.spring import SpringEffect
+from sea_ident.effects.state import State
 from sea_ident.robot import Robot
 
 KINKS = (-0.3, -0.15, 0.15, 0.3)

@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Anchor, Column, Shape, State
+from sea_ident.effects.base import Anchor, Column, Shape
 from sea_ident.effects.spring import SpringEffect, deflections
+from sea_ident.effects.state import State
 from sea_ident.robot import Robot
 
 LARGEST_STEP = 2.0

@@ -9,7 +9,8 @@ import pinocchio as pin
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action
-from sea_ident.effects.base import Anchor, Column, Contribution, Effect, Side, State
+from sea_ident.effects.base import Anchor, Column, Effect
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 

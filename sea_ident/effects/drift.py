@@ -8,7 +8,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import SimulationState
-from sea_ident.effects.base import Contribution, JointEffect, Shape, State
+from sea_ident.effects.base import JointEffect, Shape
+from sea_ident.effects.state import Contribution, State
 
 _MINUTE = 60.0
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import Column, Contribution, Effect, Shape, Side, State
+from sea_ident.effects.base import Column, Effect, Shape
 from sea_ident.effects.signal import is_closed
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

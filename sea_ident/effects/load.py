@@ -9,7 +9,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, JointAction
-from sea_ident.effects.base import Anchor, Contribution, Effect, Side, State, smooth_sign
+from sea_ident.effects.base import Anchor, Effect, smooth_sign
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

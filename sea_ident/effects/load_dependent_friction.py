@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Side
+from sea_ident.effects.base import Column
 from sea_ident.effects.load import MotorLoadEffect
+from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sea_ident.effects.base import State
+from sea_ident.effects.state import State
 
 _GEAR_MULTIPLES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
 

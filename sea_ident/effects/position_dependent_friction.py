@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Anchor, Column, JointEffect, Shape, Side, State, smooth_sign
+from sea_ident.effects.base import Anchor, Column, JointEffect, Shape, smooth_sign
 from sea_ident.effects.orders import orders
+from sea_ident.effects.state import Side, State
 from sea_ident.robot import Robot
 
 

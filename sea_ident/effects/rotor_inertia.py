@@ -7,7 +7,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action
-from sea_ident.effects.base import Column, Contribution, Effect, Side, State
+from sea_ident.effects.base import Column, Effect
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.robot import Robot
 
 

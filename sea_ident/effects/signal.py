@@ -9,7 +9,8 @@ from scipy.interpolate import CubicSpline
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action
-from sea_ident.effects.base import Column, Contribution, Effect, Shape, Side, State
+from sea_ident.effects.base import Column, Effect, Shape
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot

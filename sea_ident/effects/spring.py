@@ -5,7 +5,8 @@ from typing import ClassVar, Self
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import JointEffect, Side, State
+from sea_ident.effects.base import JointEffect
+from sea_ident.effects.state import Side, State
 from sea_ident.robot import Robot
 
 

@@ -6,9 +6,10 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape, Side, State
+from sea_ident.effects.base import Column, Shape
 from sea_ident.effects.memory import OneWayEffect
 from sea_ident.effects.spring import deflections
+from sea_ident.effects.state import Side, State
 from sea_ident.robot import Robot
 
 WIDER = 3.0

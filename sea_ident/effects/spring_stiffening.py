@@ -6,8 +6,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Shape, State
+from sea_ident.effects.base import Column, Shape
 from sea_ident.effects.spring import SpringEffect, stated
+from sea_ident.effects.state import State
 from sea_ident.robot import Robot
 
 CUBIC = 3.0

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Effect, Shape, Side
+from sea_ident.effects.base import Column, Effect, Shape
 from sea_ident.effects.drift import DriftEffect
+from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
 

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Anchor, Column, JointEffect, Shape, Side, smooth_sign
+from sea_ident.effects.base import Anchor, Column, JointEffect, Shape, smooth_sign
+from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import SimulationState
-from sea_ident.effects.base import Anchor, Column, Contribution, JointEffect, Side, State, smooth_sign
+from sea_ident.effects.base import Anchor, Column, JointEffect, smooth_sign
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, Contribution, Side, State
+from sea_ident.effects.base import Column
 from sea_ident.effects.load import MotorLoadEffect
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

@@ -7,9 +7,10 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, JointAction, SimulationState
-from sea_ident.effects.base import Column, Contribution, Shape, Side, State
+from sea_ident.effects.base import Column, Shape
 from sea_ident.effects.drift import TrendEffect, warming
 from sea_ident.effects.load import LoadEffect
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.robot import Robot
 
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Contribution, Shape
+from sea_ident.effects.base import Shape
 from sea_ident.effects.signal import SignalEffect, ahead
+from sea_ident.effects.state import Contribution
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 

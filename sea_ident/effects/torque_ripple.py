@@ -6,8 +6,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Column, JointEffect, Shape, Side, State, titled
+from sea_ident.effects.base import Column, JointEffect, Shape, titled
 from sea_ident.effects.orders import orders
+from sea_ident.effects.state import Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 

@@ -7,8 +7,9 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, JointAction
-from sea_ident.effects.base import Anchor, Column, Contribution, Shape, Side, State
+from sea_ident.effects.base import Anchor, Column, Shape
 from sea_ident.effects.load import LoadEffect
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.robot import Robot
 
 CUBE = 3.0

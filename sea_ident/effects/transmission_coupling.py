@@ -7,7 +7,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import Anchor, Column, Contribution, Effect, Shape, Side, State, smooth_sign
+from sea_ident.effects.base import Anchor, Column, Effect, Shape, smooth_sign
+from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot

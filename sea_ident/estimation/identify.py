@@ -11,9 +11,9 @@ from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
 from sea_ident.effects import Effect, JointEffect, base_effects
-from sea_ident.effects.base import Side
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.state import Side
 from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
