@@ -24,7 +24,7 @@ from sea_ident.effects import (
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.regressor import build_regressor
-from tests.benchmarks.hidden_effects import catalogue, gap, sensors
+from tests.benchmarks.hidden_effects import catalogue, forms, gap, sensors
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case
 from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
@@ -248,6 +248,20 @@ def test_every_form_has_a_law_and_every_entry_a_place(leg: gap.Gauge) -> None:
         exact = simulate_mujoco(leg.truth, leg.series, 1, planted=(planted,), rate=50.0, friction=leg.friction)
         seen = sensors.signals(exact, leg.truth, (planted,))
         assert any(not np.allclose(seen[k], plain[k][::4], rtol=0.0, atol=1e-7) for k in ("q", "theta", "tau_motor"))
+
+
+def test_a_saturation_never_delivers_less_for_more(leg: gap.Gauge) -> None:
+    """u - c u^3 as the library has it, and flat where that would turn round: else what is unsettled runs away."""
+    hooks = [forms.Hooks() for _ in leg.truth.robot.joints]
+    planted = Planted("torque_saturation", leg.truth.robot.joint_names[1], "library", 0.01)
+    forms.bind(planted, leg.truth, hooks, [], 1e-3, 1.0)
+    drive = hooks[1].drive
+    assert drive is not None
+    asked = np.linspace(-50.0, 50.0, 1001)
+    delivered = np.array([drive(forms.JointState(), float(u)) for u in asked])
+    assert np.all(np.diff(delivered) >= 0.0)
+    usual = np.abs(asked) < 5.0
+    np.testing.assert_allclose(delivered[usual], asked[usual] - 0.01 * asked[usual] ** 3, atol=1e-12)
 
 
 def test_cases_follow_from_their_seed_and_survive_json() -> None:
