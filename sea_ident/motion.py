@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.exceptions import SeaIdentError
 
 
@@ -62,7 +62,7 @@ class Motion:
         """(N, n) theta' - q' [rad/s] or [m/s]."""
         return self.dtheta - self.dq
 
-    def __getitem__(self, rows: slice | FloatArray) -> "Motion":
+    def __getitem__(self, rows: slice | FloatArray | IntArray) -> "Motion":
         """Part of the samples."""
         return Motion(
             self.time[rows], self.q[rows], self.dq[rows], self.ddq[rows],

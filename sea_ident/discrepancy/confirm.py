@@ -12,7 +12,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import flat_steps, scatter_p, significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
-from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
+from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
 FAR = 6
@@ -148,7 +148,9 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     before = settle_again(far, confirmed.final.fit)
     first = before.fit
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
-    if most < PROMISING * first.excess:
+    # a search gives up where the next effect leaves so much: none need begin
+    given_up = confirmed.selection.added > 0 and first.statistic > HOPELESS * first.dof
+    if most < (1.0 - SLOW if given_up else PROMISING) * first.excess:
         return None
     found = search(far, bench.effects, _begun(far, confirmed, before))
     fit = found.final.fit

@@ -107,13 +107,15 @@ class MeasuredDrive(Controller):
 
     def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
         """The drive at the times (N,) [s]."""
-        gains = self.like.drive(robot, reference, time)
-        motion, period = self.motion, reference.duration
+        motion, period, count = self.motion, reference.duration, len(self.motion)
+        knots = np.asarray(np.arange(count + 1) * (period / count), dtype=np.float64)
+        gains = self.like.drive(robot, reference, knots[:-1])
         bias = self.tau_motor + gains.position_gain * motion.theta + gains.velocity_gain * motion.dtheta
-        knots = np.arange(len(bias) + 1) * (period / len(bias))
         curve = CubicSpline(knots, np.concatenate([bias, bias[:1]]), bc_type="periodic")
         at_time = np.asarray(curve(time % period), dtype=np.float64)
-        return Drive(at_time, gains.position_gain, gains.velocity_gain, gains.reference)
+        # of what is followed only the samples are recorded
+        followed = gains.reference[np.round(time * (count / period)).astype(int) % count]
+        return Drive(at_time, gains.position_gain, gains.velocity_gain, followed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,6 +78,10 @@ AS_MUCH = 0.95
 NEARLY_RIGHT = 3.0
 """... once one leaves less than this statistic over degrees of freedom."""
 
+HOPEFUL = 0.4
+"""What is not in the chain of signals must promise this share of what the best of those before it explains: shapes and
+edges that are refined bring about twice what is promised, seldom more."""
+
 
 def next_effect(
     bench: Bench,
@@ -104,6 +108,8 @@ def next_effect(
     as_good = sum(c.gain > AS_MUCH * worth[0].gain for c in worth[:MOST_FINALISTS])
     for candidate in of_every_kind(worth, max(FINALISTS, as_good), worth[0].effect.joint if worth else None):
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
+            continue
+        if candidate.gain < HOPEFUL * most and not is_signal(candidate.effect):
             continue
         leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]
         least = max(useful, USEFUL_AGAIN * fit.excess) if candidate.key in again else useful

@@ -286,8 +286,7 @@ class ParameterFits(Tangents):
         """
         if not self._free.shape[2]:
             return fit.residual
-        free = stacked(self._free)
-        amounts = np.linalg.lstsq(free, stacked(fit.residual), rcond=1e-8)[0]
+        amounts = stacked(self._free).T @ stacked(fit.residual)  # the columns are orthonormal
         cleaned: ComplexArray = fit.residual - self._free @ amounts
         return cleaned
 

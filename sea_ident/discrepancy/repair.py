@@ -8,9 +8,10 @@ import numpy as np
 
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Effect, Side, spring_effects
-from sea_ident.estimation import Model, identify
-from sea_ident.estimation.identify import with_values
+from sea_ident.estimation import Model
+from sea_ident.estimation.identify import identify_observed, with_values
 from sea_ident.estimation.knowledge import regular_covariance
+from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 
@@ -45,7 +46,8 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
     try:
         with python_warnings.catch_warnings():
             python_warnings.simplefilter("ignore", SeaIdentWarning)
-            return with_what_it_misses(identify(model.robot, processed, effects=effects), processed, fit)
+            found, observations, _ = identify_observed(model.robot, processed, effects)
+            return with_what_it_misses(found, observations, fit)
     except SeaIdentError:
         return None
 
@@ -62,14 +64,14 @@ def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(effects)
 
 
-def with_what_it_misses(model: Model, processed: ProcessedRecording, fit: Fit) -> Model:
+def with_what_it_misses(model: Model, observations: Observations, fit: Fit) -> Model:
     """A model with what the fit of a diagnosis tells of bodies, of friction at links and of what the model hardly sees.
 
     Both know the torques of the motors, so that what both see of a motor is not put together: it would count twice.
 
     Args:
         model: identified from the motor torques.
-        processed: the recording.
+        observations: the equations that it was identified from.
         fit: to link and motor equations of the same recording, with the same parameters.
 
     Returns:
@@ -102,4 +104,4 @@ def with_what_it_misses(model: Model, processed: ProcessedRecording, fit: Fit) -
     )
     information = model.information.copy()
     information[np.ix_(told, told)] += np.linalg.inv(other)
-    return with_values(replace(model, uncertainty=uncertainty, information=information), processed, values)
+    return with_values(replace(model, uncertainty=uncertainty, information=information), observations, values)

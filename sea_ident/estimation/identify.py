@@ -109,6 +109,25 @@ def identify(
             f"{processed.source} was processed for the joints {', '.join(processed.joint_names)}; {robot.name} has "
             f"{', '.join(robot.joint_names)}"
         )
+    model, _, new = identify_observed(robot, processed, effects, estimator, unknown_zero, prior, tell)
+    for text in new:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+    return model
+
+
+def identify_observed(
+    robot: Robot,
+    processed: ProcessedRecording,
+    effects: Sequence[Effect] | None = None,
+    estimator: Estimator | None = None,
+    unknown_zero: Sequence[str] = (),
+    prior: Model | None = None,
+    tell: Progress = lambda what, share: None,
+) -> tuple[Model, Observations, tuple[str, ...]]:
+    """What `identify` does with a processed recording: the model, the equations it was found from, and what to warn of.
+
+    The equations serve `with_values`, which otherwise would have to be built for every period again.
+    """
     chosen, in_springs = _split_springs(default_effects(robot, processed) if effects is None else tuple(effects))
     how = default_estimator(processed) if estimator is None else estimator
     found: list[str] = list(processed.warnings)
@@ -120,7 +139,8 @@ def identify(
     tell(f"estimating {base.rank} base parameters", 0.2)
     if processed.periods == 1 and processed.samples * robot.n * base.rank * 8 > DENSE and not in_springs:
         model, more = identify_long(observations, how, unknown_zero)
-        return _reported(model, [*found, *more, *_doubts(model)], first, processed.notes)
+        found.extend([*more, *_doubts(model)])
+        return _told(model, found, processed.notes), observations, tuple(found[first:])
     estimate = how.estimate(observations)
     tell("comparing the periods", 0.75)
     uncertainty = honest_uncertainty(observations, estimate)
@@ -141,7 +161,12 @@ def identify(
         springs = steps.widened_springs(springs, model.values, known, unknown_zero, in_springs)
     model = replace(model, springs=springs)
     found.extend(_doubts(model))
-    return _reported(model, found, first, (*processed.notes, *estimate.notes))
+    return _told(model, found, (*processed.notes, *estimate.notes)), observations, tuple(found[first:])
+
+
+def _told(model: Model, found: Sequence[str], notes: tuple[str, ...]) -> Model:
+    """The model with what a user should know of it."""
+    return replace(model, warnings=tuple(dict.fromkeys(found)), notes=notes)
 
 
 def _doubts(model: Model) -> list[str]:
@@ -157,13 +182,6 @@ def _doubts(model: Model) -> list[str]:
         if s.stiffness < -5.0 * s.stiffness_std
     )
     return found
-
-
-def _reported(model: Model, found: list[str], first: int, notes: tuple[str, ...]) -> Model:
-    """The model with its warnings, those that are new also raised."""
-    for text in found[first:]:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
-    return replace(model, warnings=tuple(dict.fromkeys(found)), notes=notes)
 
 
 def default_estimator(processed: ProcessedRecording) -> Estimator:
@@ -305,15 +323,14 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
     return replace(model, excerpt=excerpt)
 
 
-def with_values(model: Model, processed: ProcessedRecording, values: FloatArray) -> Model:
+def with_values(model: Model, observations: Observations, values: FloatArray) -> Model:
     """A model with other values (b,) of its base parameters, its residuals and its springs by these.
 
     Args:
-        model: identified from the recording.
-        processed: the recording.
+        model: the model.
+        observations: the equations that it was identified from.
         values: (b,) base parameters.
     """
-    observations = Observations(model.robot, model.effects, model.base, processed)
     changed = _refitted(replace(model, values=values), observations)
     inside = tuple(effect for effect in model.spring_effects if isinstance(effect, JointEffect))
     zeros = [spring.joint for spring in model.springs if spring.zero != 0.0]
