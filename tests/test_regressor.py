@@ -14,6 +14,7 @@ from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.regressor import build_regressor, build_total, inverse_dynamics, prior_parameters, regressor_chunks
 from sea_ident.robot import Robot, load_robot
+from sea_ident.robot.rotor_columns import own_rotor_row, rotor_columns
 
 BAXTER = "example:baxter_description/urdf/baxter.urdf"
 LEFT_ARM = ("left_s0", "left_s1", "left_e0", "left_e1", "left_w0", "left_w1", "left_w2")
@@ -81,6 +82,16 @@ def test_columns_equal_an_independent_newton_euler(name: str) -> None:
         expected = other @ membership
         size = np.maximum(np.abs(expected).max(axis=(0, 1)), 1.0)  # by column: rotors go with gear ratio squared
         np.testing.assert_allclose(mine / size, expected / size, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["exo_leg", "kinova (geared)", "baxter arm, tilted rotors"])
+def test_the_row_of_its_own_motor_is_part_of_what_a_rotor_needs(name: str) -> None:
+    robot = robot_of(name)
+    motion = random_motion(robot, 5, seed=6)
+    whole = rotor_columns(robot, motion)[1]
+    assert np.any(whole)
+    for i, joint in enumerate(robot.joint_names):
+        np.testing.assert_array_equal(own_rotor_row(robot, motion, joint), whole[:, i])
 
 
 def test_own_parameters_of_the_urdf_give_its_own_torque() -> None:

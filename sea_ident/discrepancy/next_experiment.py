@@ -45,7 +45,7 @@ SEEDS = (1, 2, 3, 4)
 SAMPLES_PER_HARMONIC = 5
 """Samples of a proposed motion, per harmonic that is compared."""
 
-PLENTY = 400.0
+PLENTY = 100.0
 """Energy, in units of the noise, beyond which no further motion is looked for."""
 
 SMALLEST_ENERGY = 10.0

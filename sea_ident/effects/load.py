@@ -13,6 +13,7 @@ from sea_ident.effects.base import Anchor, Effect, smooth_sign
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
+from sea_ident.robot.rotor_columns import own_rotor_row
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class LoadEffect(Effect):
     def rotor_torque(self, state: State) -> FloatArray:
         """(N,) torque that the rotor of the joint takes for itself by its inertia [N m]."""
         robot = state.robot
-        rows = state.rotor_rows.motor[:, robot.index(self.at)]
+        rows = own_rotor_row(robot, state.motion, self.at)
         torque = np.zeros(len(rows))
         for k, rotor in enumerate(robot.rotors):
             if rotor.joint == self.at:

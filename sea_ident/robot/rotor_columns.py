@@ -5,6 +5,7 @@ link that carries it plus its own spin, and the moment that changes it needs onl
 Pinocchio's regressor of links and rotors as one tree says the same at twice the cost (see the tests).
 """
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -69,17 +70,11 @@ def rotor_columns(robot: "Robot", motion: "Motion") -> tuple[FloatArray, FloatAr
     """
     link, motor = np.zeros((2, robot.n, len(robot.rotors), len(motion)))
     turning = _Turning(robot, motion)
-    for r, index in enumerate(robot.rotor_indices):
-        i = robot.index(robot.rotors[r].joint)
-        spin = float(robot.motor_map[robot.extended_model.joints[int(index)].idx_v, i])
-        carrier = _carrier(robot, int(index))
-        rotation, omega, alpha = turning.of(carrier)
-        axis = _applied(rotation, robot.extended_model.jointPlacements[int(index)].rotation[:, 2])
-        momentum = _dot(axis, omega) + spin * motion.dtheta[:, i]
-        change = _dot(axis, alpha) + spin * motion.ddtheta[:, i]
-        motor[i, r] = spin * change
-        moment = axis * change + _cross(omega, axis) * momentum
-        body = carrier
+    for r in range(len(robot.rotors)):
+        spun = _spun(robot, motion, turning, r)
+        motor[robot.index(robot.rotors[r].joint), r] = spun.effort
+        moment = spun.axis * spun.change + _cross(spun.omega, spun.axis) * spun.momentum
+        body = spun.carrier
         while body:
             if body in turning.axes:
                 row = robot.link_map[turning.rows[body - 1]]
@@ -88,6 +83,48 @@ def rotor_columns(robot: "Robot", motion: "Motion") -> tuple[FloatArray, FloatAr
                     link[j, r] += row[j] * effort
             body = robot.model.parents[body]
     return np.moveaxis(link, 2, 0), np.moveaxis(motor, 2, 0)
+
+
+def own_rotor_row(robot: "Robot", motion: "Motion", joint: str) -> FloatArray:
+    """(N, rotors) motor row of one joint, which only its own rotors need [N m/(kg m2)]: a part of `rotor_columns`."""
+    row, turning = np.zeros((len(motion), len(robot.rotors))), _Turning(robot, motion)
+    for r, rotor in enumerate(robot.rotors):
+        if rotor.joint == joint:
+            row[:, r] = _spun(robot, motion, turning, r).effort
+    return row
+
+
+@dataclass(frozen=True, eq=False)
+class _Spun:
+    """A rotor of unit inertia.
+
+    Attributes:
+        carrier: joint of the body that carries it.
+        axis: (3, N) in the world.
+        omega: (3, N) angular velocity of its carrier [rad/s].
+        momentum: (N,) along the axis.
+        change: (N,) of that in time.
+        effort: (N,) torque on the side of the joint.
+    """
+
+    carrier: int
+    axis: FloatArray
+    omega: FloatArray
+    momentum: FloatArray
+    change: FloatArray
+    effort: FloatArray
+
+
+def _spun(robot: "Robot", motion: "Motion", turning: _Turning, r: int) -> _Spun:
+    """What the rotor at a place among those of the robot does."""
+    index, i = int(robot.rotor_indices[r]), robot.index(robot.rotors[r].joint)
+    spin = float(robot.motor_map[robot.extended_model.joints[index].idx_v, i])
+    carrier = _carrier(robot, index)
+    rotation, omega, alpha = turning.of(carrier)
+    axis = _applied(rotation, robot.extended_model.jointPlacements[index].rotation[:, 2])
+    change = _dot(axis, alpha) + spin * motion.ddtheta[:, i]
+    momentum = _dot(axis, omega) + spin * motion.dtheta[:, i]
+    return _Spun(carrier, axis, omega, momentum, change, spin * change)
 
 
 def _turning_axis(joint: pin.JointModel) -> FloatArray:

@@ -35,6 +35,39 @@ def test_what_promised_about_as_much_as_what_explains_it_all_is_compared(laborat
     assert fit.effects[-1].name == "torque_offset"
 
 
+@pytest.mark.parametrize(
+    ("name", "joint", "promised", "is_tried"),
+    [
+        ("external_force", "knee", 0.3, False),
+        ("external_force", "knee", 0.6, True),
+        ("parallel_spring", "knee", 0.3, False),
+        ("encoder_offset", "ankle", 0.3, True),
+    ],
+)
+def test_what_promises_little_beside_what_is_explained_is_not_refitted_but_for_signals(
+    rippled, monkeypatch, name, joint, promised, is_tried
+):
+    """A wave that no effect is stands beside the ripple, so that the best does not explain all."""
+    data = rippled[0].data
+    time, torque = data.motion.time - data.motion.time[0], data.tau_motor.copy()
+    torque[:, 0] += 0.3 * np.sin(2.0 * np.pi * 23.0 * time / data.period)
+    bench = Bench(replace(data, tau_motor=torque), rippled[0].effects)
+    start = settle(bench, bench.effects)
+    found = {(c.effect.name, c.effect.joint): c for c in scan(bench, start.fit, start.noise)}
+    first = found["torque_ripple", "hip"]
+    tried = []
+
+    def noted(bench, before, effect, *rest):
+        tried.append(effect.name)
+        return refitted(bench, before, effect, *rest) if effect.name == "torque_ripple" else start.fit
+
+    monkeypatch.setitem(next_effect.__globals__, "refitted", noted)
+    given = [first, replace(found[name, joint], gain=promised * first.gain)]
+    fit, _ = next_effect(bench, start, given, 1000, np.full(len(bench.data.equations), 1e-3))
+    assert fit.effects[-1].name == "torque_ripple"
+    assert (name in tried) is is_tried
+
+
 def test_what_promises_about_as_much_as_the_best_is_refitted_though_others_come_first(rippled):
     bench, start, _ = rippled
     scanned = scan(bench, start.fit, start.noise)

@@ -1,15 +1,17 @@
 """Where a motor lingers, what no model has must not hide what the rest of the motion shows."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.conclude import unexplained
-from sea_ident.discrepancy.confirm import confirm, without_the_slow
+from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import away_from_reversals, period_data, wide_processing
-from sea_ident.discrepancy.search import search
+from sea_ident.discrepancy.search import Selection, search
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.motion import FourierSeries
 from sea_ident.simulation import PlantedEffect, simulate
@@ -63,6 +65,28 @@ def test_more_caution_leaves_out_more_and_nothing_else(lingering):
     assert np.all(far.left_out >= lingering.left_out)
     assert far.left_out.mean() > lingering.left_out.mean()
     np.testing.assert_array_equal(far.tau_motor, lingering.tau_motor)
+
+
+@pytest.mark.parametrize(
+    ("added", "promised", "begins"), [(1, 0.5, False), (1, 0.7, True), (0, 0.5, True), (0, 0.2, False)]
+)
+def test_no_search_begins_that_would_be_given_up(lingering, monkeypatch, added, promised, begins):
+    """Where much is left beside what was found, a next effect that leaves 0.4 of it is the end of a search."""
+    bench = Bench(lingering, (*base_effects(lingering.robot), *spring_effects(lingering.robot)))
+    start = settle(bench, bench.effects)
+    begun = []
+
+    def searched(far, effects, found=None):
+        begun.append(found)
+        return Selection(start, start, 0, ())
+
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.HOPELESS", 1.0)
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", searched)
+    monkeypatch.setattr(
+        "sea_ident.discrepancy.confirm.scan", lambda far, fit, noise: [SimpleNamespace(gain=promised * fit.excess)]
+    )
+    assert without_the_slow(bench, Confirmed(Selection(start, start, added, ()), bench, start, start)) is None
+    assert bool(begun) is begins
 
 
 @pytest.mark.slow
