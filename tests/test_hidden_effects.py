@@ -50,6 +50,7 @@ STICKING = (82689117, "other_form", 13)
 every pass: samples that stand are compared nowhere, and the mean of the passes hardly shows it."""
 
 
+@pytest.mark.scenario
 def test_stiction_that_lets_go_elsewhere_in_every_pass_is_named(tmp_path: Path) -> None:
     seed, row, index = STICKING
     run([Task(tmp_path, seed, row, index, False)], jobs=1)

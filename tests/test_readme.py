@@ -26,6 +26,7 @@ def blocks() -> list[tuple[str, str | None]]:
     return pairs
 
 
+@pytest.mark.scenario
 def test_every_block_prints_what_stands_under_it(tmp_path):
     scope: dict[str, object] = {"__name__": "readme"}
     before = Path.cwd()

@@ -14,7 +14,7 @@ from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.motion import FourierSeries
 from sea_ident.robot import Robot
-from sea_ident.simulation import FrictionJitter, PlantedEffect, simulate
+from sea_ident.simulation import FrictionJitter, PlantedEffect, Settling, simulate
 
 PERIOD = 5.0
 
@@ -38,6 +38,8 @@ class Laboratory:
             effect = item[0] if not isinstance(item[0], str) else make_effect(item[0], item[1], **item[3])
             values = item[1] if not isinstance(item[0], str) else item[2]
             found.append(PlantedEffect(effect, np.asarray(values, dtype=float)))
+        # two periods of 5 s: the third changes by 1e-8 rad
+        options = {"settling": Settling(1e-4), **options}
         return simulate(self.leg, self.motions[motion], periods=periods, seed=seed, effects=found, **options).recording
 
     def data(self, recording):

@@ -48,6 +48,7 @@ SAME_TORQUE = [
 ]
 
 
+@pytest.mark.scenario
 def test_a_kink_never_passed_is_declared_beside_an_offset_and_play_before_a_stiffening_spring_is_not(
     preloaded,
 ):

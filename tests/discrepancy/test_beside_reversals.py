@@ -91,6 +91,7 @@ def test_another_motion_is_compared_beside_its_reversals_too(sticking, laborator
     assert held.bench.data.caution == BESIDE_REVERSALS
 
 
+@pytest.mark.scenario
 def test_a_start_of_sliding_that_a_search_did_not_see_is_no_friction_more(laboratory):
     """Its speed was left so low that no sample is slower: no step leads back."""
     speed = 0.01

@@ -176,6 +176,7 @@ def test_a_torque_that_is_late_is_none_that_lets_go_late(laboratory):
     assert breakaway_p(bench, prompt, "knee") < 1e-3
 
 
+@pytest.mark.scenario
 def test_a_diagnosis_warns_of_the_stiction_it_found(laboratory, monkeypatch):
     """Whatever was found is taken for stiction here: what the passes say of it reaches the user."""
     recording = laboratory.record([("torque_offset", "knee", [2.0], {})])

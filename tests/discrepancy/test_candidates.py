@@ -70,6 +70,7 @@ def test_candidates_behind_nearly_the_same_error_of_an_encoder_are_evaluated_onc
         assert np.sum(candidate.raw_power) == pytest.approx(np.sum(exact[candidate.key].raw_power), rel=0.02)
 
 
+@pytest.mark.scenario
 def test_the_noise_is_the_same_behind_a_rounded_error_of_an_encoder(laboratory, monkeypatch):
     floors = []
     for digits in (periods.AMOUNT_DIGITS, 16):

@@ -8,6 +8,7 @@ from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
 
+@pytest.mark.scenario
 def test_fitted_beside_what_is_known_an_effect_comes_out_as_it_does_with_all_free(laboratory):
     """What is known is a part of the stiffness that scales the residual too."""
     bench = laboratory.bench(laboratory.record([("spring_offset", "knee", [-0.4], {})]))

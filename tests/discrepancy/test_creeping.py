@@ -135,6 +135,7 @@ def test_where_it_can_be(nothing_missing):
         Creep("knee").torque(bench.robot, np.ones(1))
 
 
+@pytest.mark.scenario
 def test_creep_is_no_hysteresis(laboratory, leg):
     stiffness = 0.3 * leg.spring("knee").stiffness
     bench = laboratory.bench(laboratory.record([(PlantedCreep("knee", 0.25), [stiffness])], periods=10, step=STEP))

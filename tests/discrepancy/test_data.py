@@ -35,6 +35,7 @@ def test_good_encoders_show_the_corner_of_friction(laboratory):
     assert now.fit.statistic / now.fit.dof == pytest.approx(1.0, abs=0.08)
 
 
+@pytest.mark.scenario
 def test_bad_encoders_do_not_blur_the_sign_of_a_velocity(laboratory):
     """The regressor reaches no further than it must; no more samples are left out than for good encoders."""
     good, bad = (
@@ -82,6 +83,7 @@ def test_a_push_of_a_few_samples_or_nearly_all_the_time_is_none(nothing_missing,
     assert not too_short(bench, make_effect("torque_offset", "knee"))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("compliance", "within"), [(0.0005, 0.02), (0.0025, 0.05)])
 def test_how_far_a_link_bends(laboratory, compliance, within):
     """Half of the whole compliance behind the encoder, and the spring that is found without the effect is another."""

@@ -88,6 +88,7 @@ def test_what_holds_there_as_well_stays_possible(rivals):
     assert (name, left) == ("spring_offset", ["spring_offset"])
 
 
+@pytest.mark.scenario
 def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_turned_out_to_be(laboratory):
     """Both effects are named wrongly, and both alternatives are right: neither is judged beside the other's error."""
     planted = [("spring_offset", JOINT, [0.5], {}), ("load_dependent_friction", "hip", [0.1], {})]
@@ -176,6 +177,8 @@ def test_what_is_in_the_model_is_no_alternative_to_another_part_of_it(rivals):
     assert decide(bench, selection, listed, held)[:2] == (selection, {position + 1: ()})
 
 
+@pytest.mark.scenario
+@pytest.mark.scenario
 def test_what_is_ruled_out_makes_room_for_what_it_stood_in_for(laboratory):
     """The wrong friction at the knee does not hold on the other motion: the search goes on beside what does."""
     planted = [("torque_ripple", "hip", [3.0, 1.5], {"order": 4.0}), ("load_dependent_friction", JOINT, [0.05], {})]

@@ -97,6 +97,7 @@ def test_the_gap_is_closed_and_the_history_kept(leg, stribeck):
     assert after < 0.8 * before
 
 
+@pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_a_period_that_is_none_of_the_motion_is_said_and_written(leg, intact, tmp_path):
     """Periods of four seconds of a motion of five have nothing in common: no sample is left to be compared."""

@@ -22,6 +22,7 @@ def compared(laboratory, planted, found):
     return bench, start, now, compare_periods(bench, now.fit)
 
 
+@pytest.mark.scenario
 @pytest.fixture
 def without_drift_of_torque(monkeypatch):
     """The library without the drift of a torque constant."""
@@ -46,6 +47,7 @@ def test_a_torque_constant_that_drifts_is_no_friction_that_does(laboratory, with
     assert one.sentence in diagnosis.text
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("drift", "found"),
     [

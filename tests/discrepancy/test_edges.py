@@ -59,6 +59,7 @@ def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
     assert found.effects[-1].stop == pytest.approx(STOP, abs=1.01 * sample)
 
 
+@pytest.mark.scenario
 def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
     """Of what turns the link only the moment about the axis of the joints shows."""
     force, point = np.array([4.0, 0.0, 2.0]), {"point_x": 0.05, "point_z": -0.08}

@@ -28,6 +28,7 @@ def without_reference(recording):
     return type(recording)(recording.time, columns, recording.source)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "amounts"),
     [("encoder_offset", {"offset": 0.02}), ("position_delay", {"delay": 0.004}), ("torque_delay", {"delay": -0.012})],
@@ -82,6 +83,7 @@ def test_what_is_within_the_noise_is_no_gap_and_it_is_said(leg, series):
     assert "nothing can be said" in found.notes[-1]
 
 
+@pytest.mark.scenario
 def test_where_a_spring_with_dry_friction_rests_is_no_gap(leg, series):
     """It was loaded otherwise before the recording began: a constant in q that no model of the motion can tell."""
     effect = make_effect("spring_hysteresis", "knee", slip=0.005)

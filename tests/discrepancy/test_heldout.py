@@ -50,6 +50,7 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     assert power[1] < 0.3 * power[0]
 
 
+@pytest.mark.scenario
 def test_what_one_of_several_effects_is_worth_is_what_it_is_among_all(laboratory):
     planted = [("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0}), ("spring_offset", "knee", [0.5], {})]
     bench = laboratory.bench(laboratory.record(planted))

@@ -163,6 +163,7 @@ def test_of_two_frictions_over_one_speed_none_without_an_amount_is_its_own(nothi
     assert bent(viscous, make_effect("torque_offset", "knee")) == [False, False]
 
 
+@pytest.mark.scenario
 def test_two_frictions_that_are_there_have_their_amounts(laboratory):
     laws = [("stribeck_friction", "knee", [5.0], {"speed": 0.1}), ("nonlinear_viscous_friction", "knee", [9.0], {})]
     bench = laboratory.bench(laboratory.record(laws, periods=10))

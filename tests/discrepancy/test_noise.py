@@ -248,6 +248,7 @@ def test_a_model_that_is_wrong_by_a_twentieth_of_the_torque_is_seen(rippled):
     )
 
 
+@pytest.mark.scenario
 def test_what_a_late_torque_leaves_beside_its_jump_is_no_lack_of_the_model(laboratory, monkeypatch):
     """Friction jumps in the record when the recorded torque acts, not when the motor turns."""
     plant = plant_from_robot(laboratory.leg)

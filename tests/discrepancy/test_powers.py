@@ -33,6 +33,7 @@ def test_the_power_is_found_where_the_cube_leaves_much(laboratory):
     assert now.fit.statistic < 1.1 * now.fit.dof
 
 
+@pytest.mark.scenario
 def test_a_cube_stays_one(laboratory):
     bench, cube = saturated(laboratory, 1e-3, 3.0)
     assert with_their_powers(bench, cube, len(bench.effects)) is cube
@@ -41,6 +42,7 @@ def test_a_cube_stays_one(laboratory):
     assert cube.fit.values[last] == pytest.approx(1e-3, abs=3.0 * cube.fit.std(last))
 
 
+@pytest.mark.scenario
 def test_much_saturation_stands_still(laboratory):
     """Followed at once, the command that saturates and what is taken away jump about each other."""
     bench, now = saturated(laboratory, 1e-3, 3.0)
@@ -53,6 +55,7 @@ def test_much_saturation_stands_still(laboratory):
     assert np.max(ratios) < 1.2
 
 
+@pytest.mark.scenario
 def test_what_another_effect_leaves_speaks_for_no_other_power(laboratory):
     bench, cube = saturated(laboratory, 6e-4, 3.0, ("torque_ripple", "hip", [0.3, 0.2], {"order": 4.0}))
     assert lack_of_fit(bench, cube)[2] < LACK_LEVEL

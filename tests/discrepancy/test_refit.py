@@ -70,6 +70,7 @@ def test_beginnings_that_are_worse_than_the_estimate_are_not_followed(rippled, s
     assert max(steps) < 3.0 * right.fit.statistic
 
 
+@pytest.mark.scenario
 def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(laboratory, nothing_missing):
     """Its torque is K times the width: where a fit of both passes on, no K of another spring may come of it."""
     bench, _ = nothing_missing
@@ -88,6 +89,7 @@ def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(labor
     assert found.effects[-1].half_width == pytest.approx(width, rel=0.1)
 
 
+@pytest.mark.scenario
 def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing):
     """Where the motion does not pass the play its softness is all that tells it from a constant."""
     bench, _ = nothing_missing

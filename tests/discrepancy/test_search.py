@@ -181,6 +181,7 @@ def test_two_orders_at_one_joint_are_found_within_their_uncertainties(laboratory
     assert lack_of_fit(bench, found.final)[2] > 1e-3
 
 
+@pytest.mark.scenario
 def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(laboratory):
     """At certain times of a period a form that is not the right one leaves something too, and a push fits there."""
     push = make_effect("external_force", "ankle", start=0.4, stop=0.9)

@@ -66,6 +66,7 @@ def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_mis
     assert stand_ins(bench, selection) == ()
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("planted", "said"), [("position_delay", 1), ("link_friction", 0)])
 def test_a_late_encoder_is_no_friction_of_the_link(laboratory, planted, said):
     """It looks viscous, but for the inertia that comes late too."""

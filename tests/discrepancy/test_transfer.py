@@ -1,5 +1,7 @@
 """Whether an effect holds on another motion: what it is worth there, and what is not its own fault."""
 
+import pytest
+
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
@@ -8,6 +10,7 @@ from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
 
+@pytest.mark.scenario
 def test_what_others_gain_by_a_refit_does_not_count_against_what_another_motion_hardly_shows(laboratory):
     """The ripple of the hip is larger there; that of the ankle counts where it is large enough to be seen."""
     used, unseen, seen = (
@@ -48,6 +51,7 @@ def transfers_of(laboratory, used, there, **options):
     return transfer(other, selection, settle_again(other, other.predicted(fit.effects, fit.parameters)))
 
 
+@pytest.mark.scenario
 def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
     """The ripple of the knee is far larger on the other motion: that of the hip is what it was."""
     hip, knee = transfers_of(laboratory, ripples(0.4, 1.0), ripples(0.4, 4.5))

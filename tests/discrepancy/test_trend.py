@@ -55,6 +55,7 @@ def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
     }
 
 
+@pytest.mark.scenario
 def test_a_third_drift_has_a_name_too(laboratory):
     planted = [
         ("stiffness_drift", "ankle", [-20.0], {}),
@@ -79,6 +80,7 @@ def test_drifts_have_their_values(opposite):
         assert abs(trend.values[0]) <= 4.0 * trend.stds[0] + 1e-12
 
 
+@pytest.mark.scenario
 def test_a_spring_that_warms_up_has_its_first_rate_and_its_time_constant(laboratory):
     """The first periods are left out as unsettled, and every deflection is another: the rate is that of the start."""
     planted = [("stiffness_drift", "hip", [-250.0], {"time_constant": 20.0})]
@@ -100,6 +102,7 @@ def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     assert abs(trend.values[0] + 0.25) < 3.0 * trend.stds[0] < 0.06
 
 
+@pytest.mark.scenario
 def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(laboratory):
     recording = laboratory.record([("temperature_friction", "knee", [0.0, -0.05], {"time_constant": 24.0})], periods=12)
     whole = laboratory.data(recording)
@@ -115,6 +118,7 @@ def test_friction_that_follows_a_temperature_is_named_so_with_periods_left_out(l
     assert cos2 > 0.95
 
 
+@pytest.mark.scenario
 def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch):
     """It rises for half of the recording and falls again: no course in time does that."""
 
@@ -146,6 +150,7 @@ def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
     assert (found.trends, found.unnamed, found.notes) == ((), False, ())
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("amplitude", [3.0, 6.0])
 def test_a_start_that_still_settles_is_no_trend(laboratory, amplitude):
     """The first period is pulled, strongly at first and less and less: said, and not named."""
@@ -201,6 +206,7 @@ def test_a_drift_within_a_period_is_no_effect_of_its_own(softening):
     np.testing.assert_array_equal(known[:, 2:], 0.0)
 
 
+@pytest.mark.scenario
 def test_where_the_motion_drifts_with_its_torque_the_mean_of_the_product_is_not_that_of_the_means(laboratory):
     """A motor that turns later from pass to pass while its friction grows: no friction of the mean motion does that."""
     data = laboratory.data(laboratory.record(periods=8))
@@ -236,6 +242,7 @@ def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
     np.testing.assert_allclose(known[:, KNEE], 0.1 * 2.0 * in_the_mean(bench.data, signs), atol=1e-12)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("time_constant", "named"), [(4.0, False), (7.0, True)])
 def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_constant, named):
     planted = [("torque_constant_drift", "hip", [0.4], {"time_constant": time_constant})]

@@ -70,6 +70,7 @@ def test_named_and_held_out_periods_are_called_weaker(leg, series):
     assert found.simulation_gap["q"].shrink > 0.5
 
 
+@pytest.mark.scenario
 def test_ambiguous_with_the_experiment_that_tells(leg, series):
     recording = recorded(leg, scaled(series[0], 0.3), [named("spring_offset", "knee", [0.5])])
     found = quietly(identified(leg, recording), recording)

@@ -114,6 +114,7 @@ def not_listed(record):
     record["effects"] = [e for e in record["effects"] if e["effect"] != "spring_offset"]
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     "damage", [at_other_joint, without_value, without_covariance, friction_in_a_spring, not_listed]
 )

@@ -126,6 +126,7 @@ def test_progress_rises_within_every_start(exo):
     assert seen[-1].best == max(state.value for state in seen if state.step >= seen[-1].step - 100)
 
 
+@pytest.mark.scenario
 def test_every_criterion_is_best_in_its_own_sense(exo):
     """From no seed is a design worse, by its own criterion, than the D-optimal one; on average it is the best of all.
 
@@ -180,6 +181,7 @@ def test_what_is_raised_is_told_and_an_interrupted_design_is_of_its_criterion(ex
     assert complete.value >= max(values) - 1e-9
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("backend", ["threading", "loky"])
 def test_other_processes_find_the_same(exo, backend):
     """By a criterion other than log det, so that both rounds are there."""
@@ -413,6 +415,7 @@ def test_interruption_returns_the_best_so_far(exo):
     assert found.log_det > 0.0
 
 
+@pytest.mark.scenario
 def test_very_many_harmonics_are_begun_at_once_and_can_be_interrupted(exo):
     """1023 coefficients: said before the first step, the first step comes soon, and what is there then is inside."""
     values = []
