@@ -15,6 +15,7 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.transfer import transfer
 from sea_ident.effects import make_effect
+from sea_ident.simulation import Settling
 
 OFFSETS = [("spring_offset", "hip", [-1.2], {}), ("spring_offset", "knee", [-0.4], {})]
 """As much as the play of 2 mrad would take from the spring of the hip, whose deflection keeps its sign in both motions;
@@ -24,7 +25,7 @@ that of the knee passes zero."""
 @pytest.fixture(scope="module")
 def preloaded(laboratory):
     """A leg with loaded springs on the bench, what its model lacks, and another motion of it."""
-    bench = laboratory.bench(laboratory.record(OFFSETS, periods=8))
+    bench = laboratory.bench(laboratory.record(OFFSETS, periods=8, settling=Settling()))
     other = Bench(laboratory.data(laboratory.record(OFFSETS, periods=4, seed=9, motion=1)), bench.effects)
     start = settle(bench, bench.effects)
     effects = (*start.fit.effects, *(make_effect(name, joint) for name, joint, _, _ in OFFSETS))

@@ -19,6 +19,7 @@ from sea_ident.discrepancy.unnamed import unnamed
 from sea_ident.effects import State, make_effect
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
+from sea_ident.simulation import Settling
 
 KNEE = 1
 STEP = 2.5e-3  # of the simulator [s]
@@ -171,7 +172,8 @@ def test_hysteresis_is_no_creep_whatever_else_is_missing(laboratory, beside):
 
 def test_dry_friction_that_hardly_slips_is_no_creep(laboratory):
     """It is less like the form of the library than like creep, and most like dry friction that is wider."""
-    bench = laboratory.bench(laboratory.record([(PlantedBoucWen("ankle"), [1.0])], periods=6))
+    planted = [(PlantedBoucWen("ankle"), [1.0])]
+    bench = laboratory.bench(laboratory.record(planted, periods=6, settling=Settling()))
     selection = found(bench, 0.002, "ankle")
     now, noise = selection.final.fit, selection.final.noise
     creep = refitted(bench, now.effects[:-1], Creep("ankle", 4.0), (), noise, now.parameters)

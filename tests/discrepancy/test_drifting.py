@@ -22,7 +22,6 @@ def compared(laboratory, planted, found):
     return bench, start, now, compare_periods(bench, now.fit)
 
 
-@pytest.mark.scenario
 @pytest.fixture
 def without_drift_of_torque(monkeypatch):
     """The library without the drift of a torque constant."""
