@@ -180,6 +180,13 @@ def unexplained(confirmed: Confirmed) -> bool:
     return remainder_share(confirmed.bench, confirmed.final) > LARGEST_REMAINDER
 
 
+def beyond_the_library(confirmed: Confirmed, trends: TrendTest) -> bool:
+    """Whether what was found leaves so much that, whatever of its equals it is called, the library does not have it."""
+    if not confirmed.selection.added or trends.trends or not unexplained(confirmed):
+        return False
+    return confirmed.final.fit.excess > UNEXPLAINED_BY_FRICTION * max(confirmed.start.fit.excess, 1.0)
+
+
 def explains(training: Gap, held: Gap) -> bool:
     """Whether a gap that goes on one recording goes on the other too, where it is far beyond the noise."""
     return held.within_noise(FAR_BEYOND) or training.shrink < GOES or held.shrink > STAYS * training.shrink

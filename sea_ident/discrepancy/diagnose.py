@@ -14,7 +14,7 @@ from sea_ident.discrepancy.breakaway import stiction
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
-from sea_ident.discrepancy.conclude import FEWEST_PERIODS, conclude, unexplained
+from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude, unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
 from sea_ident.discrepancy.data import PeriodData, period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
@@ -233,7 +233,9 @@ def _tested(
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
     constant, slipping = (confirmed.selection.joints_of(kind) for kind in (SpringOffset, SpringHysteresis))
-    if alternatives:
+    if all(transfer.holds for transfer in held.transfers) and beyond_the_library(confirmed, trends):
+        alternatives = declared(alternatives)
+    elif alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     searched = False

@@ -5,6 +5,7 @@ The effect that the library lacks is planted from here and never registered.
 
 import warnings
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,14 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.conclude import _known_better, _locations, explains, predicts, without_sizes
+from sea_ident.discrepancy.conclude import (
+    _known_better,
+    _locations,
+    beyond_the_library,
+    explains,
+    predicts,
+    without_sizes,
+)
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
@@ -142,3 +150,16 @@ def test_it_is_no_matter_of_doubt_where_it_is_known_what_holds(rippled, joint, s
     found = MissingEffect("external_force", "hip", (), 0.02, 0.0, (), transfer=transfer)
     relative = Unnamed("external_force", joint, "at the same place", share, rippled[1].fit)
     assert _known_better([found], (relative,)) is expected
+
+
+def test_what_leaves_more_than_half_needs_no_choice_between_equals(rippled):
+    bench, start, right = rippled
+
+    def beyond(final, added=1, drifts=()):
+        found = Confirmed(Selection(start, final, added, ()), bench, start, final)
+        return beyond_the_library(found, SimpleNamespace(trends=drifts))
+
+    assert beyond(start)
+    assert not beyond(right)
+    assert not beyond(start, added=0)
+    assert not beyond(start, drifts=("a drift",))
