@@ -8,7 +8,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan, sought
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.free_shapes import is_signal
-from sea_ident.discrepancy.judge import penalty, physical, slowest, too_short
+from sea_ident.discrepancy.judge import at_a_bound, comes_first, is_push, penalty, physical, slowest, too_short
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
 
@@ -72,6 +72,7 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         explained = max(reduced.statistic - fit.statistic, 1e-300)
+        lawless = is_push(fit.effects[position])
         best, scanned = fit, scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
         rivals = [c for c in scanned if c.key != own and c.key not in ruled_out]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
@@ -84,10 +85,12 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
             better = best.statistic + fit.unit * (penalty(best.effects[position], bench) - 1.0)
             beat = better - fit.unit * penalty(candidate.effect, bench)
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
-            slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
-            possible = not slack and physical(bench, new, position) and not too_short(bench, new.effects[position])
+            ended, slack = new.effects[position], len(bench.slack_links(new)) > len(bench.slack_links(fit))
+            possible = not (slack or at_a_bound(ended) or too_short(bench, ended)) and physical(bench, new, position)
             gain = reduced.statistic - new.statistic if possible else 0.0
             tried[own, candidate.key] = Outdone(promised, gain / explained)
+            if is_push(candidate.effect) and not lawless:
+                possible = comes_first(gain, explained, reduced)
             if possible and new.statistic + fit.unit * penalty(new.effects[position], bench) < better:
                 best = new
         if best is not fit:

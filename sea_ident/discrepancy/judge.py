@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import free_shapes, is_signal
@@ -26,6 +26,13 @@ LARGEST_TIMES_TORQUE = 1.5
 
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
+
+COMPLETE = 0.9
+"""Share of the excess from which on an effect explains nearly all of it."""
+
+BEHIND_LAWS = 0.5
+"""Share of what a push explains from which on what acts by a law comes before it, unless the push explains nearly all:
+a push fits whatever is left at certain times of a period."""
 
 SLIPPING = 0.1
 """Share of the torque of dry friction in a spring that must be in elements that slip to and fro [-]."""
@@ -55,6 +62,9 @@ DRIVES = 0.1
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
+
+WRONG_PART = 0.2
+"""Share of what an effect explains that columns of the wrong sign may be worth, as long as others are missing [-]."""
 
 
 def significance(gain: float, columns: int, tests: int, fit: Fit, noise: NoiseFloor) -> float:
@@ -116,13 +126,36 @@ def spread(steps: FloatArray, change: FloatArray) -> float:
 
 
 def at_a_bound(effect: Effect) -> bool:
-    """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else."""
+    """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else.
+
+    So is dry friction that turns over as slowly as any may.
+    """
     for shape in effect.shapes:
-        if shape.logarithmic and shape.name not in ("smoothing", "softness", "order", "time_constant"):
-            value = float(getattr(effect, shape.name))
-            if value < 1.02 * shape.lower or value > 0.98 * shape.upper:
-                return True
+        value = float(getattr(effect, shape.name))
+        least, most = value < 1.02 * shape.lower, value > 0.98 * shape.upper
+        if shape.name == "smoothing":
+            least = False  # as sharp as any is dry friction as it should be
+        elif not shape.logarithmic or shape.name in ("softness", "order", "time_constant"):
+            continue
+        if least or most:
+            return True
     return False
+
+
+def is_push(effect: Effect) -> TypeGuard[ExternalForce]:
+    """Whether an effect acts at certain times, and by no law."""
+    return isinstance(effect, ExternalForce)
+
+
+def comes_first(gain: float, by_law: float, fit: Fit) -> bool:
+    """Whether a push may be named before what acts by a law.
+
+    Args:
+        gain: drop of the statistic with the push.
+        by_law: drop with the other effect instead.
+        fit: the model without either.
+    """
+    return gain > COMPLETE * fit.excess or BEHIND_LAWS * gain > by_law
 
 
 def too_short(bench: Bench, effect: Effect) -> bool:
@@ -130,14 +163,14 @@ def too_short(bench: Bench, effect: Effect) -> bool:
 
     Then it only stands in for something sudden, or for what acts all the time.
     """
-    if not isinstance(effect, ExternalForce):
+    if not is_push(effect):
         return False
     return _length(bench, effect) < 0.5 / bench.data.harmonics or nearly_always(bench, effect)
 
 
 def nearly_always(bench: Bench, effect: Effect) -> bool:
     """Whether a push lasts nearly all the time."""
-    return isinstance(effect, ExternalForce) and _length(bench, effect) > ALL_THE_TIME
+    return is_push(effect) and _length(bench, effect) > ALL_THE_TIME
 
 
 def _length(bench: Bench, push: ExternalForce) -> float:
@@ -163,7 +196,7 @@ def penalty(effect: Effect, bench: Bench) -> float:
     """
     # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points,
     # and where a kink is; its sides are straight then
-    found = len(effect.shapes) if isinstance(effect, ExternalForce) else 0
+    found = len(effect.shapes) if is_push(effect) else 0
     found += isinstance(effect, AsymmetricSpring) and effect.kink != 0.0
     shapes = found + len(free_shapes((effect,)))
     count = len(effect.columns(bench.robot)) + shapes
@@ -266,27 +299,58 @@ def physical(bench: Bench, fit: Fit, position: int) -> bool:
     A column that must not be negative is not, but for what its uncertainty or a small share of the effect excuses; and
     the effect is not larger than all the torque there is, which only two effects that cancel each other could be.
     """
+    return _but_for_signs(bench, fit, position) and not len(_wrong_signs(bench, fit, position))
+
+
+def possible(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> bool:
+    """Whether an effect is physical, or would be beside others that the model lacks yet.
+
+    These bend a part of it that is small to the wrong sign. With that part held at zero it explains nearly as much.
+    """
+    if not _but_for_signs(bench, fit, position):
+        return False
+    wrong = _wrong_signs(bench, fit, position)
+    if not len(wrong):
+        return True
+    factor = fit.covariance_factor[wrong]
+    cost = float(fit.values[wrong] @ np.linalg.lstsq(factor @ factor.T, fit.values[wrong], rcond=None)[0])
+    others = [e for k, e in enumerate(fit.effects) if k != position % len(fit.effects)]
+    less = bench.fit(others, noise, start=fit.parameters, tangents=False)
+    return cost < WRONG_PART * (less.statistic - fit.statistic)
+
+
+def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether an effect is possible, whatever the signs of its columns."""
     position %= len(fit.effects)
     effect = fit.effects[position]
-    counts = bench.counts(fit.effects)
-    start = sum(counts[:position])
-    columns = effect.columns(bench.robot)
+    columns, values = effect.columns(bench.robot), fit.values[_own(bench, fit, position)]
     if not columns:
         return True
-    values = fit.values[start : start + len(columns)]
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
         return False
     if not pushes_back(bench, fit, position) or not brakes(bench, fit, position):
         return False
-    spectra = bench.column_spectra(effect, fit.effects)
-    power = np.sum(np.abs(spectra * values) ** 2, axis=(0, 1))
-    total = np.sqrt(np.sum(np.abs(spectra @ values) ** 2, axis=0))
-    # terms of the law of one spring cancel in part, and what they come to is asked above
-    if not is_of_a_law(effect) and np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms):
-        return False
-    elastic = only_elastic(bench, fit, position)
-    for k, column in enumerate(columns):
-        wrong = column.nonnegative and values[k] < -2.0 * fit.std(start + k)
-        if wrong and not elastic[k] and power[k] > EXCUSED * float(power.sum()):
-            return False
-    return True
+    if is_of_a_law(effect):
+        return True  # terms of the law of one spring cancel in part, and what they come to is asked above
+    total = np.sqrt(np.sum(np.abs(bench.column_spectra(effect, fit.effects) @ values) ** 2, axis=0))
+    return not np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms)
+
+
+def _wrong_signs(bench: Bench, fit: Fit, position: int) -> IntArray:
+    """(w,) columns of a fit that belong to an effect, must not be negative and are, beyond what is excused."""
+    position %= len(fit.effects)
+    effect, own = fit.effects[position], _own(bench, fit, position)
+    signed = [column.nonnegative for column in effect.columns(bench.robot)]
+    if not any(signed) or not np.any(fit.values[own] < 0.0):
+        return np.zeros(0, dtype=np.intp)
+    values, stds = fit.values[own], np.array([fit.std(k) for k in own])
+    power = np.sum(np.abs(bench.column_spectra(effect, fit.effects) * values) ** 2, axis=(0, 1))
+    wrong = np.array(signed) & (values < -2.0 * stds) & (power > EXCUSED * float(power.sum()))
+    return np.asarray(own[wrong & ~only_elastic(bench, fit, position)], dtype=np.intp)
+
+
+def _own(bench: Bench, fit: Fit, position: int) -> IntArray:
+    """Columns of an effect in a fit."""
+    counts = bench.counts(fit.effects)
+    start = sum(counts[:position])
+    return np.arange(start, start + counts[position])

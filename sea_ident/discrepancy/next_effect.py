@@ -1,5 +1,7 @@
 """The next effect of a search: which of the candidates is added, and what it must come to."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sea_ident._typing import FloatArray
@@ -11,12 +13,15 @@ from sea_ident.discrepancy.exchange import Outdone, Tried
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
+    COMPLETE,
     at_a_bound,
+    comes_first,
     flat_steps,
     is_of_a_law,
+    is_push,
     own_torque,
     penalty,
-    physical,
+    possible,
     scatter_p,
     significance,
     too_short,
@@ -46,10 +51,8 @@ SMALLEST_SHARE = 1e-3
 """An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
 BESIDE_ANOTHER = 0.12
-"""And by this share of what another effect does to the same equation: the form of that one is known no better, ..."""
-
-COMPLETE = 0.9
-"""... unless it explains this share of the excess: what another effect in the wrong form leaves is none of its own."""
+"""And by this share of what another effect does to the same equation, for the form of that one is known no better,
+unless it explains nearly all: what another effect in the wrong form leaves is none of its own."""
 
 LARGE_TORQUE = 0.3
 """An effect of more than this share of the torque (rms) must be visible as such, ..."""
@@ -102,11 +105,12 @@ def next_effect(
     ]
     accepted: list[tuple[Fit, float]] = []
     steps, useful = (flat_steps(bench, now), least_useful(bench, now)) if worth else (np.zeros((0, 0)), 0.0)
-    most, promised, explained = 0.0, 0.0, False
+    most, by_law, promised, explained = 0.0, 0.0, 0.0, False
     again = {effect_key(effect) for effect in fit.effects[len(bench.effects) :]}
     refits: list[tuple[Candidate, float]] = []
-    as_good = sum(c.gain > AS_MUCH * worth[0].gain for c in worth[:MOST_FINALISTS])
-    for candidate in of_every_kind(worth, max(FINALISTS, as_good), worth[0].effect.joint if worth else None):
+    for candidate in _finalists(worth):
+        if is_push(candidate.effect) and not comes_first(candidate.gain / HOPEFUL, by_law, fit):
+            continue
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
             continue
         if candidate.gain < HOPEFUL * most and not is_signal(candidate.effect):
@@ -118,10 +122,16 @@ def next_effect(
         new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
         gain = fit.statistic - new.statistic
         p_value = significance(gain, candidate.columns, tests, fit, noise)
-        refits.append((candidate, gain if physical(bench, new, -1) else 0.0))
-        if p_value > FAMILY_LEVEL or gain < least or not _acceptable(bench, fit, new, steps, smallest):
+        could_be = possible(bench, new, noise, -1)
+        refits.append((candidate, gain if could_be else 0.0))
+        if not could_be or p_value > FAMILY_LEVEL or gain < least:
+            continue
+        if not _acceptable(bench, fit, new, steps, smallest):
+            continue
+        if is_push(candidate.effect) and not comes_first(gain, by_law, fit):
             continue
         accepted.append((new, p_value))
+        by_law = by_law if is_push(candidate.effect) else max(by_law, gain)
         if gain > most:
             most, promised = gain, candidate.gain
         explained = explained or new.statistic < NEARLY_RIGHT * new.dof
@@ -143,6 +153,21 @@ def next_effect(
     return best, best_p
 
 
+def _finalists(worth: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates that are refitted, best first (what acts by a law, and pushes after it)."""
+    if not worth:
+        return []
+    joint = worth[0].effect.joint
+    laws = [c for c in worth if not is_push(c.effect)]
+    pushes = [c for c in worth[: _as_good(worth)] if is_push(c.effect)]
+    return [*of_every_kind(laws, _as_good(laws), joint), *pushes]
+
+
+def _as_good(candidates: Sequence[Candidate]) -> int:
+    """How many of the first are finalists: more where they promise about as much as the best."""
+    return max(FINALISTS, sum(c.gain > AS_MUCH * candidates[0].gain for c in candidates[:MOST_FINALISTS]))
+
+
 def least_useful(bench: Bench, now: Settled) -> float:
     """Drop of the statistic that one effect more must bring.
 
@@ -161,7 +186,7 @@ def least_useful(bench: Bench, now: Settled) -> float:
 
 
 def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: FloatArray) -> bool:
-    """Whether the last effect of a new fit is large enough, could be, and is neither hidden nor a matter of one pass.
+    """Whether the last effect of a new fit is large enough, and is neither hidden nor a matter of one pass.
 
     Args:
         bench: the recording.
@@ -171,12 +196,8 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: F
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
     effect = new.effects[-1]
-    if (
-        not physical(bench, new, -1)
-        or len(bench.slack_links(new)) > len(bench.slack_links(fit))
-        or at_a_bound(effect)
-        or too_short(bench, effect)
-    ):
+    slack = len(bench.slack_links(new)) > len(bench.slack_links(fit))
+    if slack or at_a_bound(effect) or too_short(bench, effect):
         return False
     own = own_torque(bench, new, -1)
     cancels = is_signal(effect) or is_of_a_law(effect)  # an error of a sensor is taken up, and so is a term of a law

@@ -16,6 +16,7 @@ from sea_ident.discrepancy.judge import (
     bends_another,
     own_torque,
     physical,
+    possible,
     significance,
     torque_change,
     torque_changes,
@@ -132,7 +133,7 @@ def search(
         lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
         if lost and now.fit.excess > SLOW * last.fit.excess:
             break
-        if not all(physical(bench, now.fit, -k) for k in range(1, len(added) + 1)):
+        if not all(possible(bench, now.fit, now.noise, -k) for k in range(1, len(added) + 1)):
             added.pop()
             now = last
             break
@@ -190,9 +191,9 @@ def still_needed(bench: Bench, selection: Selection) -> Selection:
 def _eliminate(
     bench: Bench, now: Settled, added: list[float], tests: int, fewest: int = 1
 ) -> tuple[Settled, list[float]]:
-    """Take out effects that are no longer needed, one after the other, down to the fewest."""
+    """Take out effects that are not needed or not physical, one after the other; of the physical the fewest stay."""
     added = list(added)
-    while len(added) > fewest:
+    while len(added) > fewest or (added and not physical(bench, now.fit, -1)):
         fit, noise = now.fit, now.noise
         nameless = remainder_share(bench, now) if lack_of_fit(bench, now)[2] < LACK_LEVEL else 0.0
         first = len(fit.effects) - len(added)
@@ -203,7 +204,7 @@ def _eliminate(
             loss = without.statistic - fit.statistic
             columns = max(len(fit.effects[position].columns(bench.robot)), 1)
             visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
-            needed = visible >= SMALLEST_SHARE
+            needed = visible >= SMALLEST_SHARE and physical(bench, fit, position)
             if isinstance(fit.effects[position], ExternalForce):
                 needed = needed and own > BEYOND_FORM * nameless
                 # a push comes and goes: nothing but another push can cancel it

@@ -1,5 +1,7 @@
 """An effect that was added is replaced by a better one, and what was outdone is not tried again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.exchange import Outdone, exchange
 from sea_ident.discrepancy.next_effect import next_effect
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.settle import settle_again
+from sea_ident.discrepancy.settle import Settled, settle_again
 
 
 @pytest.fixture(scope="module")
@@ -115,3 +117,22 @@ def test_a_search_notes_what_did_less_than_what_it_took(rippled):
     others = [last for (_, rival), last in tried.items() if rival != taken]
     assert others
     assert all(last.explained < 1.0 < tried[taken, taken].explained + 1e-9 for last in others)
+
+
+@pytest.mark.parametrize(("complete", "taken"), [(False, False), (True, True)])
+def test_a_push_takes_the_place_of_a_law_only_where_it_explains_nearly_all(wrong, monkeypatch, complete, taken):
+    """Half as much again as the law does is not enough: a push fits whatever is left at certain times."""
+    bench, now = wrong
+    reduced = bench.fit(now.fit.effects[:-1], now.noise, start=now.fit.parameters)
+    by_law = reduced.statistic - now.fit.statistic
+    gain = 0.97 * reduced.excess if complete else 1.5 * by_law
+    assert 1.5 * by_law < 0.9 * reduced.excess
+    push = next(c for c in scan(bench, reduced, now.noise) if c.effect.name == "external_force")
+    pushed = bench.fit((*reduced.effects, push.effect), now.noise, start=now.fit.parameters)
+    pushed = replace(pushed, whitened=np.sqrt(1.0 - gain / reduced.statistic) * reduced.whitened)
+    monkeypatch.setattr(module, "scan", lambda *rest, **options: [replace(push, gain=gain)])
+    monkeypatch.setattr(module, "refitted", lambda *rest: pushed)
+    monkeypatch.setattr(module, "settle_again", lambda bench, fit: Settled(fit, now.noise))
+    monkeypatch.setattr(module, "physical", lambda *rest: True)
+    after = exchange(bench, now, 1, {})
+    assert (after.fit is pushed) is taken

@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.diagnose import _out
-from sea_ident.discrepancy.judge import at_a_bound, bends_another, dissipates, physical, pushes_back
+from sea_ident.discrepancy.judge import (
+    BEHIND_LAWS,
+    COMPLETE,
+    WRONG_PART,
+    at_a_bound,
+    bends_another,
+    comes_first,
+    dissipates,
+    physical,
+    possible,
+    pushes_back,
+)
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
@@ -142,6 +153,9 @@ def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing
         ("presliding_friction", {"displacement": 1e-6}, True),
         ("presliding_friction", {"displacement": 3e-5}, False),
         ("torque_saturation", {"exponent": 9.0}, True),
+        # dry friction as sharp as there is, and one that no speed of the motion is beyond
+        ("link_friction", {"smoothing": 1e-4}, False),
+        ("link_friction", {"smoothing": 0.3}, True),
     ],
 )
 def test_a_width_that_ended_at_the_end_of_its_range_is_something_else(name, shapes, ended):
@@ -171,3 +185,35 @@ def test_two_frictions_that_are_there_have_their_amounts(laboratory):
     start = settle(bench, bench.effects)
     fit = bench.refine((*start.fit.effects, *effects), start.noise, start=start.fit.parameters, only=len(bench.effects))
     assert [bends_another(bench, fit, k) for k in (-2, -1)] == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("share", "by_law", "first"),
+    [
+        (0.6, BEHIND_LAWS + 0.05, False),  # most of the excess, and a law explains more than half as much
+        (0.6, BEHIND_LAWS - 0.05, True),
+        (COMPLETE + 0.05, 1.0, True),
+    ],
+)
+def test_what_acts_by_a_law_comes_before_a_push_that_does_not_explain_nearly_all(rippled, share, by_law, first):
+    fit = rippled[1].fit
+    gain = share * fit.excess
+    assert comes_first(gain, by_law * gain, fit) is first
+
+
+def test_a_small_part_of_the_wrong_sign_is_excused_while_others_are_missing(laboratory):
+    """By what holding it at zero would cost, as a share of what the whole effect explains."""
+    bench = laboratory.bench(laboratory.record([("link_friction", "knee", [0.0, 0.2], {})], periods=5))
+    start = settle(bench, bench.effects)
+    friction = make_effect("link_friction", "knee")
+    fit = bench.fit((*start.fit.effects, friction), start.noise, start=start.fit.parameters)
+    less = bench.fit(start.fit.effects, start.noise, start=fit.parameters, tangents=False)
+    viscous = [c.name for c in fit.columns].index("knee.link_friction_viscous")
+    for share, accepted in ((0.5, True), (2.0, False)):
+        cost = share * WRONG_PART * (less.statistic - fit.statistic)
+        values = fit.values.copy()
+        values[viscous] = -np.sqrt(cost) * fit.std(viscous)
+        bent = replace(fit, values=values)
+        assert not physical(bench, bent, -1)
+        assert possible(bench, bent, start.noise, -1) is accepted
+    assert possible(bench, fit, start.noise, -1)

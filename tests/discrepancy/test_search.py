@@ -10,7 +10,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, visible_changes
-from sea_ident.discrepancy.search import Selection, search, still_needed
+from sea_ident.discrepancy.search import Selection, _eliminate, search, still_needed
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 
@@ -212,3 +212,37 @@ def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, 
     fit = bench.fit(effects, found.final.noise, start=found.final.fit.parameters)
     begun = replace(found, final=Settled(fit, found.final.noise))
     assert named(still_needed(bench, begun)) == {("torque_offset", "knee")}
+
+
+@pytest.mark.parametrize(
+    ("coulomb", "motion"),
+    [
+        (0.034, 0),  # a push would explain more of both than either alone does, but not all
+        (0.068, 1),  # without the spring the viscous part of the friction is negative
+    ],
+)
+def test_two_effects_of_a_link_are_found_by_their_laws(laboratory, coulomb, motion):
+    planted = [("parallel_spring", "knee", [0.4, 0.14], {}), ("link_friction", "knee", [0.006, coulomb], {})]
+    bench = laboratory.bench(laboratory.record(planted, periods=6, motion=motion))
+    found = search(bench, bench.effects)
+    assert named(found) == {("parallel_spring", "knee"), ("link_friction", "knee")}
+    for name, value in (("parallel_spring_stiffness", 0.4), ("link_friction_coulomb", coulomb)):
+        k = next(k for k, c in enumerate(found.final.fit.columns) if c.name == f"knee.{name}")
+        assert found.final.fit.values[k] == pytest.approx(value, abs=4.0 * found.final.fit.std(k))
+
+
+def test_what_is_not_physical_in_the_end_is_not_found(rippled):
+    """Its part of the wrong sign was excused as long as others might be missing."""
+    bench, _, right = rippled
+    fit = right.fit
+    friction = make_effect("link_friction", "hip")
+    values = dict(fit.parameters)
+    with_it = bench.fit((*fit.effects, friction), right.noise, start=values)
+    columns = [c.name for c in with_it.columns]
+    bent = with_it.values.copy()
+    bent[[columns.index(f"hip.link_friction_{part}") for part in ("viscous", "coulomb")]] = -5.0, 5.0
+    now = Settled(replace(with_it, values=bent), right.noise)
+    left, p_values = _eliminate(bench, now, [1e-9, 1e-9], 1000)
+    assert [e.name for e in left.fit.effects[-1:]] == ["torque_ripple"]
+    assert len(p_values) == 1
+    assert _eliminate(bench, Settled(replace(with_it, values=bent), right.noise), [1e-9], 1000)[1] == []
