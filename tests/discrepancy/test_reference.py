@@ -64,6 +64,7 @@ def test_both_models_have_the_effects_and_shapes_of_the_earlier_one(laboratory, 
     assert not found.changed
 
 
+@pytest.mark.scenario
 def test_a_change_too_small_to_matter_is_none_however_sure_it_is(laboratory, compared):
     """Friction of 1.5 thousandths of the torque, between recordings with hardly any noise."""
     quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter(1e-4, 0.05), "periods": 20}
