@@ -14,6 +14,7 @@ from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import (
     bends_another,
+    is_push,
     own_torque,
     physical,
     possible,
@@ -34,7 +35,6 @@ from sea_ident.discrepancy.next_effect import (
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect, JointEffect
-from sea_ident.effects.external_force import ExternalForce
 
 MOST_EFFECTS = 6
 """Largest number of effects that are added."""
@@ -205,7 +205,7 @@ def _eliminate(
             columns = max(len(fit.effects[position].columns(bench.robot)), 1)
             visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
             needed = visible >= SMALLEST_SHARE and physical(bench, fit, position)
-            if isinstance(fit.effects[position], ExternalForce):
+            if is_push(fit.effects[position]):
                 needed = needed and own > BEYOND_FORM * nameless
                 # a push comes and goes: nothing but another push can cancel it
                 needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
