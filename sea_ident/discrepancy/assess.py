@@ -1,7 +1,7 @@
 """What else an effect could be, and what could not have been seen."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -11,7 +11,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import ABSORBED, Candidate, scan, sought
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.findings import Alternative, Detectability
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.judge import (
     EQUALLY_GOOD,
     FEWEST_TO_SEARCH,
@@ -31,6 +31,7 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS
 from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.side_by_side import side_by_side
 from sea_ident.singular_values import svd
 
 THE_SAME = 0.05
@@ -69,24 +70,21 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
         scanned = scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
-        tried = [c for c in scanned if c.key != effect_key(own)]
-        for candidate in of_every_kind(tried, RIVALS):
-            if candidate.gain < 0.3 * gain:
+        tried = of_every_kind([c for c in scanned if c.key != effect_key(own)], RIVALS)
+        tried = [c for c in tried if not c.gain < 0.3 * gain]
+        for candidate, solution in zip(tried, side_by_side(_InPlace(bench, now, position, enough), tried), strict=True):
+            if solution is None:
                 continue
-            beat = fit.statistic + enough
-            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
+            new = bench.again(solution, noise)
             price = fit.unit * (penalty(new.effects[position], bench) - penalty(own, bench))
-            if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
-                continue
-            if new.statistic - fit.statistic < enough and physical(bench, new, position):
-                explained = reduced.whitened - fit.whitened
-                share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
-                other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-                if new.statistic - fit.statistic + price < enough:
-                    alike.append(other)
-                    scores.append(new.statistic)
-                else:
-                    dearer.append((other, new.statistic))
+            explained = reduced.whitened - fit.whitened
+            share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
+            other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
+            if new.statistic - fit.statistic + price < enough:
+                alike.append(other)
+                scores.append(new.statistic)
+            else:
+                dearer.append((other, new.statistic))
         # what this motion shows as exactly the same as one of them is as likely, however many parameters it has
         alike.extend(
             replace(other, dearer=not any(abs(own_score - s) < THE_SAME for s in scores)) for other, own_score in dearer
@@ -94,6 +92,34 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (not a.dearer, a.cos2))}
         found[position] = tuple(sorted(unique.values(), key=lambda a: (a.dearer, -a.cos2)))
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _InPlace:
+    """Refits candidates in the place of an effect.
+
+    Attributes:
+        bench: the recording.
+        now: the model with the effect.
+        position: of the effect in it.
+        enough: difference of the statistic up to which another does as well.
+    """
+
+    bench: Bench
+    now: Settled
+    position: int
+    enough: float
+
+    def __call__(self, candidate: Candidate) -> Solution | None:
+        """The model with a candidate in the place of the effect, None where that does not do as well."""
+        bench, fit, noise, position = self.bench, self.now.fit, self.now.noise, self.position
+        before, after, beat = fit.effects[:position], fit.effects[position + 1 :], fit.statistic + self.enough
+        new = refitted(bench, before, candidate.effect, after, noise, fit.parameters, beat)
+        if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
+            return None
+        if new.statistic - fit.statistic < self.enough and physical(bench, new, position):
+            return new.solution
+        return None
 
 
 def no_worse(fit: Fit, gain: float) -> float:

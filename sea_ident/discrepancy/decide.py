@@ -1,14 +1,14 @@
 """What one motion does not tell apart another may: equals are compared on data that were not used."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.findings import Alternative
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
@@ -18,6 +18,7 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.transfer import Transfer
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
+from sea_ident.side_by_side import side_by_side
 
 Alternatives = dict[int, tuple[Alternative, ...]]
 
@@ -116,40 +117,78 @@ def decide(
         own = held.transfers[position - first]
         left: list[Alternative] = []
         memory = remembering(bench, selection, held, position)
-        for other in others if memory is None else (*others, memory):
-            fit = other.fit
-            if fit is None:
-                left.append(other)
-                continue
-            if other.dearer and own.excess < EQUALLY_GOOD * own.unit:
-                # nothing there that more parameters could explain
-                continue
-            if changed:
-                # it was fitted beside an effect that is out by now
-                fit = _beside(bench, selection, position, fit)
-            if _twice(fit, position, selection.added):
-                continue
-            replaced = replace(selection, final=Settled(fit, selection.final.noise))
-            rival = held.worth(replaced, position)
-            if _better(rival, own):
-                before = selection.final.fit
-                selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
-                held = held.again(replaced)
-                # what was no better than the one that is now out was no better than this one
-                left = []
-                out = before.effects[position]
-                other, fit = Alternative(out.name, out.joint, other.cos2), before
-                own, rival = rival, own
-            elif other.dearer:
-                continue
-            elif not _better(own, rival):
-                left.append(replace(other, fit=fit))
-                continue
-            same = _with_another_shape(bench, selection, held, position, fit, rival)
-            if same is not None:
-                left.append(replace(other, fit=same))
+        waiting = list(others if memory is None else (*others, memory))
+        while waiting:
+            comparison, compared = _Comparison(bench, selection, held, position, own, changed), list(waiting)
+            for other, rival in zip(compared, side_by_side(comparison, compared), strict=True):
+                waiting.pop(0)
+                fit = comparison.fit(other)
+                if fit is None:
+                    left.append(other)
+                if fit is None or rival is None:
+                    continue
+                swapped = _better(rival, own)
+                if swapped:
+                    before = selection.final.fit
+                    replaced = replace(selection, final=Settled(fit, selection.final.noise))
+                    selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
+                    held = held.again(replaced)
+                    # what was no better than the one that is now out was no better than this one
+                    left = []
+                    out = before.effects[position]
+                    other, fit = Alternative(out.name, out.joint, other.cos2), before
+                    own, rival = rival, own
+                elif other.dearer:
+                    continue
+                elif not _better(own, rival):
+                    left.append(replace(other, fit=fit))
+                    continue
+                same = _with_another_shape(bench, selection, held, position, fit, rival)
+                if same is not None:
+                    left.append(replace(other, fit=same))
+                if swapped:
+                    # the others are held against this one from here on
+                    break
         kept[position] = tuple(left)
     return selection, kept, held
+
+
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Tries alternatives of an effect on another motion.
+
+    Attributes:
+        bench: the recording that was used.
+        selection: what was found on it.
+        held: the other motion.
+        position: of the effect in the model.
+        own: what the effect is worth there.
+        changed: whether the alternatives were fitted beside an effect that is out by now.
+    """
+
+    bench: Bench
+    selection: Selection
+    held: HeldOut
+    position: int
+    own: Transfer
+    changed: bool
+
+    def fit(self, other: Alternative) -> Fit | None:
+        """The model with an alternative, None where there is none."""
+        if other.fit is None or not self.changed:
+            return other.fit
+        return _beside(self.bench, self.selection, self.position, other.fit)
+
+    def __call__(self, other: Alternative) -> Transfer | None:
+        """What an alternative is worth; None where that does not matter."""
+        if other.fit is None or (other.dearer and self.own.excess < EQUALLY_GOOD * self.own.unit):
+            # nothing there that more parameters could explain
+            return None
+        fit = self.fit(other)
+        if fit is None or _twice(fit, self.position, self.selection.added):
+            return None
+        replaced = replace(self.selection, final=Settled(fit, self.selection.final.noise))
+        return self.held.worth(replaced, self.position)
 
 
 def _with_another_shape(
@@ -157,9 +196,11 @@ def _with_another_shape(
 ) -> Fit | None:
     """A fit whose effect the other motion rules out, with a shape with which it does not; None where there is none."""
     own = held.transfers[position - len(selection.final.fit.effects) + selection.added]
-    for other, result in _open_shapes(bench, selection, held, position, fit, found):
-        if not _better(own, result):
-            return other
+    shapes = _OpenShapes(bench, selection, held, position, fit, found)
+    for ways in side_by_side(shapes, _other_shapes(bench, fit, position)):
+        for solution, result in ways:
+            if not _better(own, result):
+                return shapes.again(solution)
     return None
 
 
@@ -169,16 +210,16 @@ def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, posi
     best = held.transfers[position - len(fit.effects) + selection.added]
     if best.excess < EQUALLY_GOOD * best.unit:
         return selection, held
-    chosen = selection
-    for other, result in _open_shapes(bench, selection, held, position, fit, best):
-        if _better(result, best):
-            best, chosen = result, replace(selection, final=Settled(other, selection.final.noise))
+    shapes, chosen = _OpenShapes(bench, selection, held, position, fit, best), selection
+    for ways in side_by_side(shapes, _other_shapes(bench, fit, position)):
+        for solution, result in ways:
+            if _better(result, best):
+                best = result
+                chosen = replace(selection, final=Settled(shapes.again(solution), selection.final.noise))
     return chosen, held if chosen is selection else held.again(chosen)
 
 
-def _open_shapes(
-    bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
-) -> Iterator[tuple[Fit, Transfer]]:
+class _OpenShapes:
     """A fit with other shapes of one effect that do as well on the motion that was used.
 
     A motion may leave a shape open: play that is never closed is the same torque whatever its width. Then only all the
@@ -191,28 +232,38 @@ def _open_shapes(
         position: of the effect.
         fit: the model with the effect as it was found, ...
         found: ... and what it is worth on the other motion.
-
-    Yields:
-        The model with another shape, and what it is worth on the other motion; the next one in a direction only where
-        the last was better.
     """
-    # each compared with the fit as it was found in one and the same noise floor
-    noise = bench.noise(fit)
-    base = bench.fit(fit.effects, noise, start=fit.parameters)
-    enough = EQUALLY_GOOD * base.unit
-    for ways in _other_shapes(bench, fit, position):
-        last = found
+
+    def __init__(
+        self, bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
+    ) -> None:
+        self._bench, self._selection, self._held, self._position = bench, selection, held, position
+        self._found = found
+        # each compared with the fit as it was found in one and the same noise floor
+        self._noise = bench.noise(fit)
+        self._base = bench.fit(fit.effects, self._noise, start=fit.parameters)
+
+    def __call__(self, ways: Sequence[Effect]) -> list[tuple[Solution, Transfer]]:
+        """Models with shapes in one direction, and what each is worth there, on as long as that becomes more."""
+        bench, base, last = self._bench, self._base, self._found
+        shown = []
         for effect in ways:
-            effects = list(fit.effects)
-            effects[position] = effect
-            other = bench.fit(effects, noise, start=base.parameters)
-            if other.statistic - base.statistic > enough or not physical(bench, other, position):
+            effects = list(base.effects)
+            effects[self._position] = effect
+            other = bench.fit(effects, self._noise, start=base.parameters)
+            worse = other.statistic - base.statistic > EQUALLY_GOOD * base.unit
+            if worse or not physical(bench, other, self._position):
                 break
-            result = held.worth(replace(selection, final=Settled(other, noise)), position)
-            yield other, result
+            result = self._held.worth(replace(self._selection, final=Settled(other, self._noise)), self._position)
+            shown.append((other.solution, result))
             if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:
                 break
             last = result
+        return shown
+
+    def again(self, solution: Solution) -> Fit:
+        """One of these models."""
+        return self._bench.again(solution, self._noise)
 
 
 def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:

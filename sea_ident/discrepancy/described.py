@@ -28,6 +28,12 @@ MOST_ROUNDS = 10
 STANDS = 1e-3
 """A step that takes less than this share of what is left was the last [-]."""
 
+FAR_OFF = 30.0
+"""Times the statistic of interest from which on an effect that ended in the wrong place is not begun again [-]."""
+
+NEAR = 4
+"""Rounds in which a fit that was begun in the right place arrives."""
+
 BENT = 1.5
 """Factor between the stiffness of a spring and its description beyond which a model has bent it [-]."""
 
@@ -67,6 +73,8 @@ def from_described_springs(
         The fit that comes of the other beginning where springs have bent, that is another place and better; else the
         fit as it is.
     """
+    if fit.statistic > FAR_OFF * beat:
+        return fit
     before, effect, after = fit.effects[:position], fit.effects[position], fit.effects[position + 1 :]
     if not isinstance(effect, SignalEffect) or not any(
         _bent(bench, effect, known) for known in (start, fit.parameters)
@@ -80,7 +88,7 @@ def from_described_springs(
     model = (*before, begun.effect, *after)
     # the noise floor of a model that has bent its springs is as wrong as they are
     own = bench.noise(bench.predicted(model, begun.parameters))
-    right = bench.refine(model, own, start=begun.parameters, only=len(bench.effects))
+    right = bench.refine(model, own, start=begun.parameters, only=len(bench.effects), rounds=NEAR)
     least = min(beat, fit.statistic)
     new = bench.refine(right.effects, noise, start=right.parameters, only=len(bench.effects), beat=least)
     return min((fit, new), key=lambda one: (len(bench.slack_links(one)), one.statistic))

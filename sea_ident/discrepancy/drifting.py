@@ -95,13 +95,13 @@ def drifting(
         first, *gains = _Drifts(bench, now, temperature, own).gains(trend, others)
         best = int(np.argmax(gains))
         if gains[best] - first > EQUALLY_GOOD:
-            found.append(UnnamedDrift(trend.effect.name, trend.effect.joint, own[best].name, 0.0, fit))
+            found.append(UnnamedDrift(trend.effect.name, trend.effect.joint, own[best].name, 0.0, fit.solution))
     if trends.unnamed and not trends.trends and sized:
         drifts = _Drifts(bench, now, temperature, sized)
         _, *gains = drifts.gains()
         best = int(np.argmax(gains))
         if gains[best] > max(UNEXPLAINED * drifts.excess, EQUALLY_GOOD):
-            found.append(UnnamedDrift(sized[best].name, sized[best].joint, sized[best].name, 0.0, fit))
+            found.append(UnnamedDrift(sized[best].name, sized[best].joint, sized[best].name, 0.0, fit.solution))
     return tuple(found)
 
 

@@ -7,10 +7,12 @@ from typing import TypeAlias
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan, sought
 from sea_ident.discrepancy.columns import Key, effect_key
+from sea_ident.discrepancy.fit import Solution
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import at_a_bound, comes_first, is_push, penalty, physical, slowest, too_short
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.side_by_side import side_by_side
 
 RIGHT = 1.2
 """Statistic over degrees of freedom up to which no other effect is tried in the place of one that was added."""
@@ -63,21 +65,64 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
     Returns:
         The model with the better ones.
     """
-    first = len(now.fit.effects) - added
-    for position in range(first, first + added):
-        fit, noise = now.fit, now.noise
+    position, last = len(now.fit.effects) - added, len(now.fit.effects)
+    while position < last:
+        challenge = _Challenge(bench, now, dict(tried), ruled_out)
+        for challenged in side_by_side(challenge, range(position, last)):
+            position += 1
+            tried.update(challenged.tried)
+            if challenged.better is not None:
+                # what comes after it is to be held against what there is now
+                now = settle_again(bench, bench.again(challenged.better, now.noise))
+                break
+    return now
+
+
+@dataclass(frozen=True, eq=False)
+class _Challenged:
+    """What came of trying others in the place of an effect.
+
+    Attributes:
+        better: the model with the best of them, None where none is better.
+        tried: what did not take its place.
+    """
+
+    better: Solution | None
+    tried: Tried
+
+
+@dataclass(frozen=True, eq=False)
+class _Challenge:
+    """Tries others in the place of an effect that was added.
+
+    Attributes:
+        bench: the recording.
+        now: the model.
+        tried: what did not take the place of another before.
+        ruled_out: effects that are not tried.
+    """
+
+    bench: Bench
+    now: Settled
+    tried: Tried
+    ruled_out: Collection[Key]
+
+    def __call__(self, position: int) -> _Challenged:
+        """Try others in the place of the effect at a position."""
+        bench, fit, noise = self.bench, self.now.fit, self.now.noise
+        tried: Tried = {}
         if fit.statistic < RIGHT * fit.dof and not slowest(fit.effects[position]):
-            continue
+            return _Challenged(None, tried)
         own = effect_key(fit.effects[position])
         others = [e for k, e in enumerate(fit.effects) if k != position]
         reduced = bench.fit(others, noise, start=fit.parameters)
         explained = max(reduced.statistic - fit.statistic, 1e-300)
         lawless = is_push(fit.effects[position])
         best, scanned = fit, scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
-        rivals = [c for c in scanned if c.key != own and c.key not in ruled_out]
+        rivals = [c for c in scanned if c.key != own and c.key not in self.ruled_out]
         for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
             promised = candidate.gain / explained
-            last = tried.get((own, candidate.key))
+            last = self.tried.get((own, candidate.key))
             if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
                 continue
             if last is not None and not last.again(promised):
@@ -93,6 +138,4 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
                 possible = comes_first(gain, explained, reduced)
             if possible and new.statistic + fit.unit * penalty(new.effects[position], bench) < better:
                 best = new
-        if best is not fit:
-            now = settle_again(bench, best)
-    return now
+        return _Challenged(None if best is fit else best.solution, tried)

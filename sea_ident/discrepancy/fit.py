@@ -26,6 +26,21 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
+class Solution:
+    """What a fit came to: all that it takes to have it again, and light enough to be sent from one process to another.
+
+    Attributes:
+        effects: the model, with its shapes.
+        values: (p,) parameters.
+        frame: of the fit.
+    """
+
+    effects: tuple[Effect, ...]
+    values: FloatArray
+    frame: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A model fitted to the mean residual, everything free.
 
@@ -55,6 +70,11 @@ class Fit:
     free_shapes: tuple[tuple[int, Shape], ...]
     frame: FloatArray | None = None
     known: Known | None = None
+
+    @property
+    def solution(self) -> Solution:
+        """What it came to."""
+        return Solution(self.effects, self.values, self.frame)
 
     @property
     def statistic(self) -> float:

@@ -37,6 +37,7 @@ from sea_ident.motion import FourierSeries, Motion
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
+from sea_ident.side_by_side import side_by_side
 from sea_ident.simulation import (
     Controller,
     Drive,
@@ -218,9 +219,10 @@ def simulation_gap(
     notes = [command.note] if command.note else []
     parts = command.parts(processed)
     deviations = []
-    for label, model in (("before", before), ("after", after)):
+    simulations = side_by_side(lambda model: [simulated(model, command, part) for part in parts], (before, after))
+    for label in ("before", "after"):
         try:
-            runs = [simulated(model, command, part) for part in parts]
+            runs = next(simulations)
         except SeaIdentError as error:
             notes.append(f"no forward simulation of the model {label} the repair: {error}")
             return SimulationGap({}, tuple(notes))

@@ -1,6 +1,7 @@
 """The next effect of a search: which of the candidates is added, and what it must come to."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import Candidate
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.exchange import Outdone, Tried
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
     COMPLETE,
@@ -30,6 +31,7 @@ from sea_ident.discrepancy.judge import (
 )
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.side_by_side import side_by_side
 
 FAMILY_LEVEL = 1e-3
 """Probability of accepting anything where nothing is missing."""
@@ -69,8 +71,11 @@ FINALISTS = 4
 MOST_FINALISTS = 7
 """... and up to so many where they promise about as much as the best of them."""
 
+AT_ONCE = 2
+"""Candidates that are refitted at a time, whether there are cores for them or not: so the outcome is the same."""
+
 LAST_TWO = 2
-"""Of these the best are compared with the shapes of the model refined too."""
+"""Of the candidates the best are compared with the shapes of the model refined too."""
 
 LITTLE_LEFT = 0.02
 """An effect that leaves less than this share of the excess is compared only with what promises more than it, ..."""
@@ -108,49 +113,109 @@ def next_effect(
     most, by_law, promised, explained = 0.0, 0.0, 0.0, False
     again = {effect_key(effect) for effect in fit.effects[len(bench.effects) :]}
     refits: list[tuple[Candidate, float]] = []
-    for candidate in _finalists(worth):
+
+    def passed_over(candidate: Candidate) -> bool:
+        """Whether it is not worth a refit beside what was accepted before it."""
         if is_push(candidate.effect) and not comes_first(candidate.gain / HOPEFUL, by_law, fit):
-            continue
+            return True
         if most > (1.0 - LITTLE_LEFT) * fit.excess and candidate.gain < min(most, AS_MUCH * promised) and explained:
-            continue
-        if candidate.gain < HOPEFUL * most and not is_signal(candidate.effect):
-            continue
+            return True
+        return candidate.gain < HOPEFUL * most and not is_signal(candidate.effect)
+
+    waiting = _finalists(worth)
+    while waiting := [c for c in waiting if not passed_over(c)]:
+        pair, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
         leaders = sorted(new.statistic for new, _ in accepted)[:LAST_TWO]
-        least = max(useful, USEFUL_AGAIN * fit.excess) if candidate.key in again else useful
         # one that explains too little, or less than those that are compared in the end, need not be known exactly
-        beat = min([fit.statistic - least, *leaders[LAST_TWO - 1 :]])
-        new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
-        gain = fit.statistic - new.statistic
-        p_value = significance(gain, candidate.columns, tests, fit, noise)
-        could_be = possible(bench, new, noise, -1)
-        refits.append((candidate, gain if could_be else 0.0))
-        if not could_be or p_value > FAMILY_LEVEL or gain < least:
-            continue
-        if not _acceptable(bench, fit, new, steps, smallest):
-            continue
-        if is_push(candidate.effect) and not comes_first(gain, by_law, fit):
-            continue
-        accepted.append((new, p_value))
-        by_law = by_law if is_push(candidate.effect) else max(by_law, gain)
-        if gain > most:
-            most, promised = gain, candidate.gain
-        explained = explained or new.statistic < NEARLY_RIGHT * new.dof
+        interest = [fit.statistic, *leaders[LAST_TWO - 1 :]]
+        needs = [max(useful, USEFUL_AGAIN * fit.excess) if c.key in again else useful for c in pair]
+        trial = _Trial(bench, now, steps, smallest, tests, tuple(interest))
+        outcomes = side_by_side(trial, list(zip(pair, needs, strict=True)))
+        for candidate in pair:
+            if passed_over(candidate):
+                break
+            outcome = next(outcomes)
+            refits.append((candidate, outcome.gain if outcome.possible else 0.0))
+            if not outcome.acceptable or (is_push(candidate.effect) and not comes_first(outcome.gain, by_law, fit)):
+                continue
+            new = bench.again(outcome.solution, noise)
+            accepted.append((new, outcome.p_value))
+            by_law = by_law if is_push(candidate.effect) else max(by_law, outcome.gain)
+            if outcome.gain > most:
+                most, promised = outcome.gain, candidate.gain
+            explained = explained or new.statistic < NEARLY_RIGHT * new.dof
+        outcomes.close()
     if not accepted:
         return None
     # what is left by the best is left by lack of other effects as well, and small differences are a matter of these
     unit = min((new for new, _ in accepted), key=lambda new: new.statistic).unit
     accepted.sort(key=lambda item: item[0].statistic + unit * penalty(item[0].effects[-1], bench))
 
-    def score(new: Fit) -> float:
+    def score(item: tuple[Fit, float]) -> float:
+        new, _ = item
         whole = bench.refine(new.effects, noise, start=new.parameters) if len(accepted) > 1 else new
         return whole.statistic + unit * penalty(new.effects[-1], bench)
 
-    best, best_p = min(accepted[:LAST_TWO], key=lambda item: score(item[0]))
+    last = accepted[:LAST_TWO]
+    scores = list(side_by_side(score, last))
+    best, best_p = last[scores.index(min(scores))]
     own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
     if tried is not None:
         for candidate, gain in refits:
             tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
     return best, best_p
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """What came of a candidate that was refitted.
+
+    Attributes:
+        solution: the model with it.
+        gain: drop of the statistic.
+        p_value: its significance.
+        possible: whether it is, or would be beside others.
+        acceptable: whether it may be added.
+    """
+
+    solution: Solution
+    gain: float
+    p_value: float
+    possible: bool
+    acceptable: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Refits candidates with everything free.
+
+    Attributes:
+        bench: the recording.
+        now: the model without them.
+        steps: (S, M) whitened steps between periods without them.
+        smallest: (E,) change of the torque that matters, as a share of it [-].
+        tests: number of shapes of all candidates.
+        interest: statistics that each must stay below to be of interest, the first less what it must explain.
+    """
+
+    bench: Bench
+    now: Settled
+    steps: FloatArray
+    smallest: FloatArray
+    tests: int
+    interest: tuple[float, ...]
+
+    def __call__(self, tried: tuple[Candidate, float]) -> _Outcome:
+        """Refit a candidate that must explain so much of the statistic."""
+        (candidate, least), bench, fit, noise = tried, self.bench, self.now.fit, self.now.noise
+        beat = min(self.interest[0] - least, *self.interest[1:], np.inf)
+        new = refitted(bench, fit.effects, candidate.effect, (), noise, fit.parameters, beat)
+        gain = fit.statistic - new.statistic
+        p_value = significance(gain, candidate.columns, self.tests, fit, noise)
+        could_be = possible(bench, new, noise, -1)
+        acceptable = could_be and p_value <= FAMILY_LEVEL and gain >= least
+        acceptable = acceptable and _acceptable(bench, fit, new, self.steps, self.smallest)
+        return _Outcome(new.solution, gain, p_value, could_be, acceptable)
 
 
 def _finalists(worth: Sequence[Candidate]) -> list[Candidate]:

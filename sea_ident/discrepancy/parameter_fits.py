@@ -1,6 +1,7 @@
 """Parameters of models fitted to one recording, their shapes held."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,14 +9,14 @@ import numpy as np
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, spectrum
-from sea_ident.discrepancy.fit import Fit, Known
+from sea_ident.discrepancy.fit import Fit, Known, Solution
 from sea_ident.discrepancy.free_samples import free_samples
 from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, stacked
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Parts, Whitening
-from sea_ident.effects import Effect
+from sea_ident.effects import Column, Effect
 from sea_ident.regressor import prior_parameters
 
 MOST_FIT_STEPS = 10
@@ -26,6 +27,37 @@ LEAST_STIFFNESS = 0.02
 
 WHITENINGS_KEPT = 3
 """Noise floors of which whitened columns are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What a fit of the parameters of a model is given.
+
+    Attributes:
+        effects: the model.
+        noise: noise floor, None where all equations count alike.
+        known: what is there beside the model.
+        columns: (p,) its labels.
+        design: (H + 1, E, p) its columns.
+        target: (H + 1, E) what it is fitted to.
+        whitening: by the noise.
+        parts: (G, M, p) whitened columns in parts.
+        whole: (G, M) whitened target in parts.
+        slopes: (E, p) part of every parameter in the stiffness of the links.
+        beside: (E,) stiffness that is known beside it.
+    """
+
+    effects: tuple[Effect, ...]
+    noise: NoiseFloor | None
+    known: Known | None
+    columns: tuple[Column, ...]
+    design: ComplexArray
+    target: ComplexArray
+    whitening: Whitening
+    parts: Parts
+    whole: FloatArray
+    slopes: FloatArray
+    beside: FloatArray
 
 
 class ParameterFits(Tangents):
@@ -96,33 +128,57 @@ class ParameterFits(Tangents):
         Returns:
             The fit.
         """
-        effects = tuple(effects)
-        columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
-        target = self._target if known is None else self._target - known.torque
-        beside = np.zeros(len(self.data.equations)) if known is None else known.stiffness
-        parts = whitening.design(effects)
-        whole = self._whole(whitening) if known is None else whitening.in_parts(target[:, :, None]) @ np.ones(1)
-        slopes = self.stiffness_slopes(columns, design, effects)
+        given = self._given(tuple(effects), noise, known)
         if start is None and noise is not None:
             start = self.fit(effects, None, tangents=False).parameters
         if start is None:
-            values = np.nan_to_num(prior_parameters(self.robot, effects))
+            values = np.nan_to_num(prior_parameters(self.robot, given.effects))
         else:
-            values = np.array([start.get(column.name, 0.0) for column in columns])
-        scale = np.ones(len(self.data.equations))
+            values = np.array([start.get(column.name, 0.0) for column in given.columns])
+        frame = None
         if noise is None:
-            factors = whitening.factors(scale)
-            values = values + least_squares(parts.scaled(factors), factors @ (whole - parts @ values))[0]
-            frame = None
+            factors = given.whitening.factors(np.ones(len(self.data.equations)))
+            left = given.whole - given.parts @ values
+            values = values + least_squares(given.parts.scaled(factors), factors @ left)[0]
         else:
-            values, frame = self._descend(parts, whole, whitening, slopes, beside, values)
-            scale = self._link_scale(slopes @ values + beside)
-        left = whole - parts @ values
+            values, frame = self._descend(given, values)
+        return self._at(given, values, frame, tangents)
+
+    def again(self, solution: Solution, noise: NoiseFloor, known: Known | None = None) -> Fit:
+        """A fit from what it came to, to the last digit.
+
+        Args:
+            solution: of a fit on this recording.
+            noise: noise floor that it was fitted in.
+            known: what is there beside the model.
+
+        Returns:
+            The fit, its shapes free.
+        """
+        return self._at(self._given(solution.effects, noise, known), solution.values, solution.frame, tangents=True)
+
+    def _given(self, effects: tuple[Effect, ...], noise: NoiseFloor | None, known: Known | None) -> "_Given":
+        columns, design, whitening = self.labels(effects), self.design(effects), self.whitening(noise)
+        parts = whitening.design(effects)
+        slopes = self.stiffness_slopes(columns, design, effects)
+        if known is None:
+            target, whole, beside = self._target, self._whole(whitening), np.zeros(len(self.data.equations))
+        else:
+            target, beside = self._target - known.torque, known.stiffness
+            whole = whitening.in_parts(target[:, :, None]) @ np.ones(1)
+        return _Given(effects, noise, known, columns, design, target, whitening, parts, whole, slopes, beside)
+
+    def _at(self, given: "_Given", values: FloatArray, frame: FloatArray | None, tangents: bool) -> Fit:
+        """A model with parameters (p,) that were fitted."""
+        effects, columns, noise, slopes, parts = given.effects, given.columns, given.noise, given.slopes, given.parts
+        design, whitening = given.design, given.whitening
+        stiffness = slopes @ values + given.beside
+        scale = np.ones(len(self.data.equations)) if noise is None else self._link_scale(stiffness)
+        left = given.whole - parts @ values
         factors = whitening.factors(scale)
         whitened = factors @ left
-        residual = target - design @ values
+        residual = given.target - design @ values
         shapes = free_shapes(effects) if tangents else ()
-        stiffness = slopes @ values + beside
         # not the whitening itself, which keeps the columns of all candidates
         whitener, free, part_of = whitening.whitener, whitening.free, whitening.parts
 
@@ -139,21 +195,14 @@ class ParameterFits(Tangents):
             return flat, spectra
 
         frame = None if shapes else frame
-        return Fit(effects, columns, values, residual, scale, whitened, free, linear, shapes, frame, known)
+        return Fit(effects, columns, values, residual, scale, whitened, free, linear, shapes, frame, given.known)
 
-    def _descend(
-        self,
-        parts: Parts,
-        whole: FloatArray,
-        whitening: Whitening,
-        slopes: FloatArray,
-        beside: FloatArray,
-        values: FloatArray,
-    ) -> tuple[FloatArray, FloatArray | None]:
+    def _descend(self, given: "_Given", values: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness.
 
         And the frame (p, r) of the first step: between steps columns change by that scale alone.
         """
+        parts, whole, whitening, slopes, beside = given.parts, given.whole, given.whitening, given.slopes, given.beside
         cost, best, step = np.inf, values, np.zeros(len(values))
         frame: FloatArray | None = None
         for _ in range(MOST_FIT_STEPS):

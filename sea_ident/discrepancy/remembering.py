@@ -22,6 +22,7 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
+from sea_ident.side_by_side import side_by_side
 
 CONFIRMED = 0.99
 """Share of what a constant could explain on another motion from which on it is the same there [-]: to a tenth of it."""
@@ -74,17 +75,15 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
     )
     tried: list[tuple[Effect, Mapping[str, float]]] = [(element, now.parameters) for element in sticking]
     tried.extend((f.effects[position], f.parameters) for f in _on_the_other(held, selection, position, slipping))
-    best: tuple[float, Fit] | None = None
-    for element, start in tried:
-        fit = _here(bench, selection, position, element, start)
-        if fit is None:
-            continue
-        left = held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position).excess
-        if best is None or left < best[0]:
-            best = left, fit
+    fits = [fit for element, start in tried if (fit := _here(bench, selection, position, element, start)) is not None]
+
+    def left(fit: Fit) -> float:
+        return held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position).excess
+
+    best = min(zip(side_by_side(left, fits), range(len(fits)), strict=True), default=None)
     if best is None or best[0] > found.excess * (MOST_OF_IT if found.share > CONFIRMED else 1.0):
         return None
-    return Alternative(SpringHysteresis.name, effect.joint, 1.0, best[1], dearer=True)
+    return Alternative(SpringHysteresis.name, effect.joint, 1.0, fits[best[1]], dearer=True)
 
 
 def _on_the_other(held: HeldOut, selection: Selection, position: int, elements: Sequence[Effect]) -> list[Fit]:

@@ -11,7 +11,7 @@ from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.edges import sharpened
 from sea_ident.discrepancy.exchange import Tried, exchange
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.judge import (
     bends_another,
     is_push,
@@ -35,6 +35,7 @@ from sea_ident.discrepancy.next_effect import (
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect, JointEffect
+from sea_ident.side_by_side import side_by_side
 
 MOST_EFFECTS = 6
 """Largest number of effects that are added."""
@@ -197,27 +198,63 @@ def _eliminate(
         fit, noise = now.fit, now.noise
         nameless = remainder_share(bench, now) if lack_of_fit(bench, now)[2] < LACK_LEVEL else 0.0
         first = len(fit.effects) - len(added)
-        scores = []
-        for position in range(first, len(fit.effects)):
-            others = [e for k, e in enumerate(fit.effects) if k != position]
-            without = bench.refine(others, noise, start=fit.parameters, only=len(bench.effects))
-            loss = without.statistic - fit.statistic
-            columns = max(len(fit.effects[position].columns(bench.robot)), 1)
-            visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
-            needed = visible >= SMALLEST_SHARE and physical(bench, fit, position)
-            if is_push(fit.effects[position]):
-                needed = needed and own > BEYOND_FORM * nameless
-                # a push comes and goes: nothing but another push can cancel it
-                needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
-            needed = needed and not bends_another(bench, fit, position)
-            p_value = significance(loss, columns, tests, without, noise) if needed else 1.0
-            scores.append((p_value, position, without))
-        worst = max(scores, key=lambda s: (s[0], -s[2].statistic))
-        if worst[0] <= FAMILY_LEVEL:
+        positions = range(first, len(fit.effects))
+        scores = list(side_by_side(_Elimination(bench, now, tests, nameless), positions))
+        worst = max(zip(scores, positions, strict=True), key=lambda each: (each[0].p_value, -each[0].statistic))
+        if worst[0].p_value <= FAMILY_LEVEL:
             break
-        now = settle_again(bench, worst[2])
+        now = settle_again(bench, bench.again(worst[0].left, noise))
         del added[worst[1] - first]
     return now, added
+
+
+@dataclass(frozen=True, eq=False)
+class _Without:
+    """What is left without an effect.
+
+    Attributes:
+        p_value: of the effect, 1 where it is not needed.
+        statistic: without it.
+        left: the model without it.
+    """
+
+    p_value: float
+    statistic: float
+    left: Solution
+
+
+@dataclass(frozen=True, eq=False)
+class _Elimination:
+    """Takes effects out of a model.
+
+    Attributes:
+        bench: the recording.
+        now: the model.
+        tests: number of shapes of all candidates.
+        nameless: torque that is left without a name, as a share of it [-].
+    """
+
+    bench: Bench
+    now: Settled
+    tests: int
+    nameless: float
+
+    def __call__(self, position: int) -> _Without:
+        """The model without the effect at a position."""
+        bench, fit, noise = self.bench, self.now.fit, self.now.noise
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        without = bench.refine(others, noise, start=fit.parameters, only=len(bench.effects))
+        loss = without.statistic - fit.statistic
+        columns = max(len(fit.effects[position].columns(bench.robot)), 1)
+        visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
+        needed = visible >= SMALLEST_SHARE and physical(bench, fit, position)
+        if is_push(fit.effects[position]):
+            needed = needed and own > BEYOND_FORM * self.nameless
+            # a push comes and goes: nothing but another push can cancel it
+            needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
+        needed = needed and not bends_another(bench, fit, position)
+        p_value = significance(loss, columns, self.tests, without, noise) if needed else 1.0
+        return _Without(p_value, without.statistic, without.solution)
 
 
 def without(bench: Bench, selection: Selection, weak: Sequence[int]) -> Selection:

@@ -62,7 +62,7 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
         elif isinstance(effect, LinkFriction) and not fits and _is_viscous(bench, fit, position):
             words = "as viscous alone, as if its encoder were late, and leaves more than noise"
         if words:
-            found.append(StandIn(effect.name, effect.joint, words, 1.0, fit))
+            found.append(StandIn(effect.name, effect.joint, words, 1.0, fit.solution))
     return tuple(found)
 
 

@@ -15,6 +15,7 @@ from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
+from sea_ident.side_by_side import side_by_side
 
 TRANSFERS = 0.5
 """Share of what an effect could explain of other data that it must explain as it was found to be more than suspect
@@ -70,7 +71,7 @@ def transfer(
     fit = selection.final.fit
     added = range(len(fit.effects) - selection.added, len(fit.effects))
     wanted = added if positions is None else positions
-    return [_Trial(bench, fit, added, now, position).outcome() for position in wanted]
+    return list(side_by_side(lambda position: _Trial(bench, fit, added, now, position).outcome(), wanted))
 
 
 class _Trial:

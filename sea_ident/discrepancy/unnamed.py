@@ -26,7 +26,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.creeping import Creep, creeping, no_dry_friction
 from sea_ident.discrepancy.end_stops import EndStop, end_stops
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
@@ -36,6 +36,7 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
+from sea_ident.side_by_side import side_by_side
 
 LEAVES = 0.3
 """Share of the excess that a relative may leave of what the named effect leaves to be taken for the truth, unless it
@@ -43,6 +44,10 @@ leaves no more than noise [-]."""
 
 PROMISED = 0.5
 """Share of what the named effect explains that a relative must promise to explain before it is fitted [-]."""
+
+OF_INTEREST = 4.0
+"""Times the statistic of the named effect above which a relative is not fitted to the end [-]: not even with the shapes
+of the model as it has them it comes to as little."""
 
 TRIED = 2
 """Relatives of an effect that are fitted, those that promise most."""
@@ -63,7 +68,7 @@ class Unnamed:
         joint: its joint.
         relative: how the other differs, in words.
         share: what it leaves of what the named one leaves [-].
-        fit: the whole model with it in the place of the effect.
+        solution: the whole model with it in the place of the effect.
         second: name of another effect of the joint in the place of which it is too, None where there is none.
     """
 
@@ -71,7 +76,7 @@ class Unnamed:
     joint: str | None
     relative: str
     share: float
-    fit: Fit
+    solution: Solution
     second: str | None = None
 
     @property
@@ -105,18 +110,19 @@ def unnamed(
     """
     now = selection.final
     pairs = _one_for_two(*(away or (bench, now)), selection, held)
-    first, found = len(now.fit.effects) - selection.added, []
     stops = end_stops(bench)
     leaves = lack_of_fit(bench, now)[2] < LACK_LEVEL
-    for k in range(selection.added):
-        own = now.fit.effects[first + k]
+
+    def in_place_of(position: int) -> Unnamed | None:
+        own = now.fit.effects[position]
         outside: tuple[Effect, ...] = stops if leaves or isinstance(own, ExternalForce) else ()
         if leaves:
             outside = (*outside, *creeping(bench, own))
-        best = _best(bench, now, first + k, outside)
-        if best is not None and _holds(best, selection, held, k):
-            found.append(best)
-    return (*pairs, *found)
+        best = _best(bench, now, position, outside)
+        return best[0] if best is not None and _holds(best[1], selection, held, position) else None
+
+    positions = range(len(now.fit.effects) - selection.added, len(now.fit.effects))
+    return (*pairs, *(found for found in side_by_side(in_place_of, positions) if found is not None))
 
 
 def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
@@ -141,14 +147,14 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
                 break
             # the load is that of the model with both: without them it bends
             relative = bench.anchored((*others, candidate.effect), fit.parameters)[-1]
-            new = refitted(bench, others, relative, (), noise, fit.parameters)
+            new = refitted(bench, others, relative, (), noise, fit.parameters, OF_INTEREST * fit.statistic)
             if new.statistic - fit.statistic > EQUALLY_GOOD * fit.unit:
                 # the shapes of the model are those beside the two
                 new = bench.refine(new.effects, noise, start=new.parameters)
             if new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
                 other = second.title.removesuffix(f" at {second.joint}")
-                found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new, other))
+                found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new.solution, other))
                 break
     return tuple(found)
 
@@ -161,18 +167,17 @@ def _transfers(fit: Fit, selection: Selection, held: HeldOut | None) -> bool:
     return held.worth(fewer, len(fit.effects) - 1).holds
 
 
-def _holds(relative: Unnamed, selection: Selection, held: HeldOut | None, k: int) -> bool:
-    """Whether a relative explains another motion as well, and better than the effect that was found."""
+def _holds(fit: Fit, selection: Selection, held: HeldOut | None, position: int) -> bool:
+    """Whether a model with a relative explains another motion as well, and better than the effect that was found."""
     if held is None or not held.other_motion:
         return True
-    replaced = replace(selection, final=replace(selection.final, fit=relative.fit))
-    first = len(relative.fit.effects) - selection.added
-    rival, own = held.worth(replaced, first + k), held.transfers[k]
+    replaced = replace(selection, final=replace(selection.final, fit=fit))
+    rival, own = held.worth(replaced, position), held.transfers[position - len(fit.effects) + selection.added]
     return rival.holds and rival.statistic < own.statistic
 
 
-def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]) -> Unnamed | None:
-    """What explains much more in the place of an effect, of its own relatives and some of no kin."""
+def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]) -> tuple[Unnamed, Fit] | None:
+    """What explains much more in the place of an effect, of its own relatives and some of no kin, and the model."""
     fit, noise = now.fit, now.noise
     own = fit.effects[position]
     others = [e for k, e in enumerate(fit.effects) if k != position]
@@ -181,12 +186,13 @@ def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]
         return None
     reduced = bench.fit(others, noise, start=fit.parameters)
     gain = reduced.statistic - fit.statistic
-    best: Unnamed | None = None
+    best: tuple[Unnamed, Fit] | None = None
     better = EQUALLY_GOOD + 2.0 * float(np.log(len(family)))
     for candidate in scan(bench, reduced, noise, family)[:TRIED]:
         if candidate.gain < PROMISED * gain:
             continue
-        new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters)
+        before, after, beat = others[:position], others[position:], OF_INTEREST * fit.statistic
+        new = refitted(bench, before, candidate.effect, after, noise, fit.parameters, beat)
         if new.excess > LEAVES * fit.excess:
             # the shapes of the model are those beside the named effect
             new = bench.refine(new.effects, noise, start=new.parameters)
@@ -197,8 +203,8 @@ def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]
             continue
         if isinstance(candidate.effect, Creep) and not no_dry_friction(bench, new, position, noise):
             continue
-        if best is None or share < best.share:
-            best = Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new)
+        if best is None or share < best[0].share:
+            best = Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new.solution), new
     return best
 
 

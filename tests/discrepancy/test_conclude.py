@@ -148,7 +148,7 @@ def test_what_only_the_samples_near_reversals_show_has_its_place_there(rippled):
 def test_it_is_no_matter_of_doubt_where_it_is_known_what_holds(rippled, joint, share, transfer, expected):
     """A push that follows the position comes at another time on another motion."""
     found = MissingEffect("external_force", "hip", (), 0.02, 0.0, (), transfer=transfer)
-    relative = Unnamed("external_force", joint, "at the same place", share, rippled[1].fit)
+    relative = Unnamed("external_force", joint, "at the same place", share, rippled[1].fit.solution)
     assert _known_better([found], (relative,)) is expected
 
 
