@@ -22,7 +22,7 @@ from sea_ident.discrepancy.judge import (
     spread,
     too_short,
 )
-from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL
 from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.refit import of_every_kind, refitted
@@ -218,7 +218,7 @@ def _beside_reversals(
     bench, settled = judged
     fit = settled.fit
     column = whiten(bench.whitener(settled.noise), bench.column_spectra(effect, fit.effects) * fit.scale[:, None])
-    across = fit.off(off(bench.free_basis(settled.noise), column))[:, 0]
+    across = fit.off(bench.freed(settled.noise).off(column))[:, 0]
     strength, power = float(np.linalg.norm(across)), float(np.sum(column**2))
     if not strength**2 > ABSORBED * power:
         return float("inf"), 1.0

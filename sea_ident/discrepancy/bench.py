@@ -10,11 +10,13 @@ from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
+from sea_ident.discrepancy.freed import Freed
 from sea_ident.discrepancy.linear import off, span
 from sea_ident.discrepancy.noise import (
     ComplexArray,
     NoiseFloor,
     closed_freedom_of_many,
+    leverage_of,
     noise_beside_model,
     noise_from_steps,
     step_freedom,
@@ -185,7 +187,12 @@ class Bench(ParameterFits):
         for _ in range(NOISE_ROUNDS):
             whitening = Whitening(self, noise.whitener(), self._free)
             taken = span(whitening.flat(fit.directions))
-            noise = noise_beside_model(steps, noise, each, np.concatenate([whitening.free, taken], axis=1))
+            leverage = whitening.free.leverage + leverage_of(taken, len(self.data.equations))
+
+            def left(flat: FloatArray, free: Freed = whitening.free, taken: FloatArray = taken) -> FloatArray:
+                return off(taken, free.off(flat))
+
+            noise = noise_beside_model(steps, noise, each, left, leverage)
         return noise
 
     @cached_property

@@ -138,7 +138,8 @@ def scan(
     """
     left = fit.off(fit.whitened)
     # single precision is plenty for a comparison of normalised columns, and half the work
-    model = _Model(fit, bench.whitener(noise), left, np.concatenate([fit.free, fit.basis], axis=1).astype(np.float32))
+    basis = np.concatenate([fit.free.basis, fit.basis], axis=1).astype(np.float32)
+    model = _Model(fit, bench.whitener(noise), left, basis)
     effects = candidate_effects(bench, fit.effects) if effects is None else effects
     if instead_of is not None:
         effects = [effect for effect in effects if instead_of.concerns(bench.equations_of(effect))]

@@ -184,7 +184,7 @@ def _best_edges(
     basis = span(rest_columns)
 
     def across(columns: FloatArray) -> FloatArray:
-        return off(basis, off(fit.free, columns))
+        return off(basis, fit.free.off(columns))
 
     left = across(fit.whitened + fit.flat[:, own] @ fit.values[own])
     others = [e for k, e in enumerate(fit.effects) if k != position]

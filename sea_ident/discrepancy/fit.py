@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.freed import Freed
 from sea_ident.discrepancy.linear import off, solve, solve_near
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Effect, Shape
@@ -51,7 +52,7 @@ class Fit:
         residual: (H + 1, E) complex residual of the mean [N m].
         scale: (E,) factor of the residual before it is whitened [-].
         whitened: (M,) whitened residual.
-        free: (M, m) orthonormal basis of the samples that are left out.
+        free: the samples that are left out.
         linear: gives `flat` and `directions` to those that ask: most fits are trials of which nothing but the statistic
             is wanted.
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
@@ -65,7 +66,7 @@ class Fit:
     residual: ComplexArray
     scale: FloatArray
     whitened: FloatArray
-    free: FloatArray
+    free: Freed
     linear: Callable[[], tuple[FloatArray, ComplexArray]]
     free_shapes: tuple[tuple[int, Shape], ...]
     frame: FloatArray | None = None
@@ -112,7 +113,7 @@ class Fit:
     @property
     def dof(self) -> int:
         """Degrees of freedom of the statistic."""
-        return int(len(self.whitened) - self.free.shape[1] - self.basis.shape[1])
+        return int(len(self.whitened) - self.free.count - self.basis.shape[1])
 
     @property
     def unit(self) -> float:
@@ -126,7 +127,7 @@ class Fit:
 
     def off(self, columns: FloatArray) -> FloatArray:
         """Columns (M, ...) without what anything that is free could take up of them."""
-        return off(self.basis, off(self.free, columns))
+        return off(self.basis, self.free.off(columns))
 
     @cached_property
     def parameters(self) -> dict[str, float]:

@@ -96,9 +96,9 @@ def own_torque(bench: Bench, fit: Fit, position: int) -> float:
 
 def flat_steps(bench: Bench, now: Settled) -> FloatArray:
     """(S, M) whitened steps between periods over the root of two, in units of the noise of the mean of all."""
-    whitener, free = bench.whitener(now.noise) / np.sqrt(bench.data.averaged), bench.free_basis(now.noise)
-    flat = np.stack([whiten(whitener, step) for step in bench.period_steps(now.fit)])
-    return np.asarray(flat - (flat @ free) @ free.T, dtype=np.float64)
+    whitener = bench.whitener(now.noise) / np.sqrt(bench.data.averaged)
+    flat = np.stack([whiten(whitener, step) for step in bench.period_steps(now.fit)], axis=1)
+    return np.ascontiguousarray(bench.freed(now.noise).off(flat).T)
 
 
 def scatter_p(steps: FloatArray, change: FloatArray) -> float:

@@ -60,10 +60,10 @@ def _scatter(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
     """(S, N, E) steps between the periods, without what the samples that are left out put into them [N m]."""
     count = len(bench.data.equations)
     flat = np.stack([stacked(residual / fit.scale) for residual in bench.period_steps(fit)])
-    free = bench.free_basis(noise)
-    if free.shape[1]:
+    free = bench.freed(noise)
+    if free.count:
         # the same span, not whitened: as in the residual of the mean
-        plain = np.matmul(np.linalg.inv(bench.whitener(noise)), unstacked(free, count))
+        plain = np.matmul(np.linalg.inv(bench.whitener(noise)), unstacked(free.basis, count))
         basis = np.linalg.qr(stacked(plain))[0]
         flat = flat - (flat @ basis) @ basis.T
     return np.stack([waveform(unstacked(values, count), bench.data.samples) for values in flat])

@@ -132,14 +132,13 @@ def separation(bench: Bench, noise: NoiseFloor, pair: Pair) -> float:
 
 def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: Fit) -> float:
     """Energy of an effect of one model outside all that another can follow."""
-    whitener, free = bench.whitener(noise), bench.free_basis(noise)
+    whitener, free = bench.whitener(noise), bench.freed(noise)
     directions = bench.design(against.effects)
     shapes = free_shapes(against.effects)
     if shapes:
         bent, _ = bench.tangents(against.effects, against.columns, against.values, shapes)
         directions = np.concatenate([directions, bent], axis=2)
-    flat = whiten(whitener, directions)
-    flat -= free @ (free.T @ flat)
+    flat = free.off(whiten(whitener, directions))
     basis = solve(flat, np.zeros(len(flat)))[1]
     if is_signal(truth.effects[position]):
         others = [e for k, e in enumerate(truth.effects) if k != position]
@@ -147,8 +146,7 @@ def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: F
         torque = without.residual - with_it.residual
     else:
         torque = contribution(bench, truth, [position])
-    signal = whiten(whitener, torque)
-    signal = signal - free @ (free.T @ signal)
+    signal = free.off(whiten(whitener, torque))
     signal = signal - basis @ (basis.T @ signal)
     return float(signal @ signal)
 

@@ -1,6 +1,6 @@
 """The noise floor, from the periods of the recording itself."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -224,7 +224,19 @@ def unstacked(values: FloatArray, equations: int) -> ComplexArray:
     return np.concatenate([first[None].astype(np.complex128), (real + 1j * imaginary).reshape(shape)])
 
 
-def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, each: float, basis: FloatArray) -> NoiseFloor:
+def leverage_of(basis: FloatArray, equations: int) -> FloatArray:
+    """(H + 1, E) share of the noise of every coefficient that an orthonormal basis (M, r) takes up [-]."""
+    share = unstacked(np.sum(basis**2, axis=1), equations)
+    return np.concatenate([share[:1].real, (share[1:].real + share[1:].imag) / 2.0])
+
+
+def noise_beside_model(
+    steps: ComplexArray,
+    plain: NoiseFloor,
+    each: float,
+    off: Callable[[FloatArray], FloatArray],
+    leverage: FloatArray,
+) -> NoiseFloor:
     """Noise floor of what a fit leaves: the part of the scatter that it takes up is not in it.
 
     Friction that differs from pass to pass gathers around reversals. Samples left out and columns of friction take
@@ -234,17 +246,14 @@ def noise_beside_model(steps: ComplexArray, plain: NoiseFloor, each: float, basi
         steps: (S, H + 1, E) differences of the residuals of successive periods over the root of two.
         plain: noise floor of the residuals as they are.
         each: degrees of freedom of a variance from these steps.
-        basis: (M, r) orthonormal basis of everything that is free, whitened by `plain`.
+        off: takes out of columns (M, S), whitened by `plain`, what everything that is free takes up of them.
+        leverage: (H + 1, E) share of the noise of every coefficient that it takes up [-].
 
     Returns:
         The noise floor.
     """
     whitener, count = plain.whitener(), plain.equations
-    flat = np.stack([stacked(np.matmul(whitener, r[:, :, None])[:, :, 0]) for r in steps])
-    flat = flat - (flat @ basis) @ basis.T
-    share = unstacked(np.sum(basis**2, axis=1), count)
-    leverage = share.real.copy()
-    leverage[1:] = (share[1:].real + share[1:].imag) / 2.0
+    flat = off(stacked(np.matmul(whitener, steps.transpose(1, 2, 0)))).T
     colour = np.linalg.inv(whitener)
     size = np.linalg.norm(colour, axis=2)
     # levelled by a floor that is smoothed more than the new one: one as rough as that follows the very steps, and what

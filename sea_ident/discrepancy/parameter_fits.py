@@ -12,7 +12,8 @@ from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal
 from sea_ident.discrepancy.fit import Fit, Known, Solution
 from sea_ident.discrepancy.free_samples import free_samples
 from sea_ident.discrepancy.free_shapes import free_shapes
-from sea_ident.discrepancy.linear import least_squares, least_squares_near, off, whiten
+from sea_ident.discrepancy.freed import FreeColumns, Freed
+from sea_ident.discrepancy.linear import least_squares, least_squares_near, whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, stacked
 from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Parts, Whitening
@@ -74,7 +75,7 @@ class ParameterFits(Tangents):
         self.effects = tuple(effects)
         self._target = spectrum(data.target(data.tau_motor), data.harmonics)
         self._left_out = data.left_out
-        self._free = free_samples(data.left_out, data.harmonics, data.alike)
+        self._free = FreeColumns.of(free_samples(data.left_out, data.harmonics, data.alike))
         self._whitenings: list[tuple[NoiseFloor | None, Whitening]] = []
 
     def release(self, effects: Sequence[Effect]) -> None:
@@ -89,7 +90,7 @@ class ParameterFits(Tangents):
                         left_out[:, e] |= rows
         if np.any(left_out != self._left_out):
             self._left_out, self._whitenings = left_out, []
-            self._free = free_samples(left_out, self.data.harmonics, self.data.alike)
+            self._free = FreeColumns.of(free_samples(left_out, self.data.harmonics, self.data.alike))
 
     def predicted(self, effects: Sequence[Effect], parameters: Mapping[str, float]) -> Fit:
         """A model with given parameters, nothing fitted."""
@@ -101,7 +102,8 @@ class ParameterFits(Tangents):
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
         empty = np.zeros((len(flat), 0))
-        return Fit(effects, columns, values, residual, scale, flat, empty, lambda: (empty, nothing), ())
+        free = Freed(self._plain_whitener(), FreeColumns.of(nothing))
+        return Fit(effects, columns, values, residual, scale, flat, free, lambda: (empty, nothing), ())
 
     def fit(
         self,
@@ -190,7 +192,7 @@ class ParameterFits(Tangents):
                 spectra = self.scaled(design, slopes, residual, scale, stiffness)
             if shapes:
                 bent = self.scaled(*self.tangents(effects, columns, values, shapes), residual, scale, stiffness)
-                flat = np.concatenate([flat, off(free, whiten(whitener, bent))], axis=1)
+                flat = np.concatenate([flat, free.off(whiten(whitener, bent))], axis=1)
                 spectra = np.concatenate([spectra, bent], axis=2)
             return flat, spectra
 
@@ -318,8 +320,8 @@ class ParameterFits(Tangents):
             whitening.target = whitening.in_parts(self._target[:, :, None]) @ np.ones(1)
         return whitening.target
 
-    def free_basis(self, noise: NoiseFloor | None) -> FloatArray:
-        """(M, m) orthonormal basis of the samples that are left out, whitened."""
+    def freed(self, noise: NoiseFloor | None) -> Freed:
+        """The samples that are left out, whitened."""
         return self.whitening(noise).free
 
     def statistic(self, fit: Fit, noise: NoiseFloor) -> float:
@@ -333,10 +335,11 @@ class ParameterFits(Tangents):
         All harmonics and equations count alike, whatever their noise: where something is missing, it would be spread to
         where there is more noise, and to the samples of other equations that share it.
         """
-        if not self._free.shape[2]:
+        free = self._free.spectra
+        if not self._free.count:
             return fit.residual
-        amounts = stacked(self._free).T @ stacked(fit.residual)  # the columns are orthonormal
-        cleaned: ComplexArray = fit.residual - self._free @ amounts
+        amounts = stacked(free).T @ stacked(fit.residual)  # the columns are orthonormal
+        cleaned: ComplexArray = fit.residual - free @ amounts
         return cleaned
 
     def whitener(self, noise: NoiseFloor | None) -> ComplexArray:

@@ -42,7 +42,7 @@ class StretchBench(Bench):
 
     def noise(self, fit: Fit) -> NoiseFloor:
         """Noise floor from the residual of a fit."""
-        return _from_residual(self.clean_residual(fit) * fit.scale, self._free.shape[2])
+        return _from_residual(self.clean_residual(fit) * fit.scale, self._free.count)
 
 
 def _from_residual(residual: ComplexArray, taken: int) -> NoiseFloor:

@@ -8,7 +8,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
-from sea_ident.discrepancy.linear import off, whiten
+from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
 from sea_ident.discrepancy.trend_values import bend, time_constants
 from sea_ident.effects import Contribution, Effect, corrected_motion, effect_classes
@@ -120,9 +120,9 @@ def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect, period: int | None 
 
 def flat_periods(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
     """(P, M) residuals of periods as they are cut, whitened by the noise of one of them, without their mean."""
-    whitener, free = bench.whitener(noise) / np.sqrt(bench.data.periods), bench.free_basis(noise)
-    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(fit)])
-    flat = flat - (flat @ free) @ free.T
+    whitener = bench.whitener(noise) / np.sqrt(bench.data.periods)
+    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(fit)], axis=1)
+    flat = bench.freed(noise).off(flat).T
     return np.asarray(flat - flat.mean(axis=0), dtype=np.float64)
 
 
@@ -138,11 +138,11 @@ class PeriodColumns:
     def __init__(self, bench: Bench, fit: Fit, noise: NoiseFloor) -> None:
         self._bench, self._fit = bench, fit
         self._whitener = bench.whitener(noise) / np.sqrt(bench.data.periods)
-        self._free = bench.free_basis(noise)
+        self._freed = bench.freed(noise)
 
     def flat(self, spectra: ComplexArray) -> FloatArray:
         """(M, k) whitened columns of one period from scaled spectra (H + 1, E, k)."""
-        return off(self._free, whiten(self._whitener, spectra))
+        return self._freed.off(whiten(self._whitener, spectra))
 
     def causes(self, temperature: FloatArray | None) -> list[Cause]:
         """Every trend of the library that shows in anything.

@@ -13,7 +13,8 @@ from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.columns import Columns
 from sea_ident.discrepancy.data import EquationKind
 from sea_ident.discrepancy.free_shapes import seen_by, signal_effects
-from sea_ident.discrepancy.linear import off, span, whiten
+from sea_ident.discrepancy.freed import FreeColumns, Freed
+from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Effect
 
@@ -71,18 +72,18 @@ class Whitening:
     Args:
         columns: of the recording.
         whitener: (H + 1, E, E).
-        free: (H + 1, E, m) spectra of the samples that are left out.
+        free: columns of the samples that are left out.
 
     Attributes:
         whitener: (H + 1, E, E).
-        free: (M, m) orthonormal basis of the samples that are left out, whitened.
+        free: the samples that are left out, whitened.
         parts: (E,) part that each equation belongs to; the first is that of the equations without a spring.
         target: (G, M) measured torques in parts, once they were asked for.
     """
 
-    def __init__(self, columns: Columns, whitener: ComplexArray, free: ComplexArray) -> None:
+    def __init__(self, columns: Columns, whitener: ComplexArray, free: FreeColumns) -> None:
         self.whitener = whitener
-        self.free = span(whiten(whitener, free))
+        self.free = Freed(whitener, free)
         self.target: FloatArray | None = None
         self._columns = columns
         links = [equation.kind is EquationKind.LINK for equation in columns.data.equations]
@@ -92,7 +93,7 @@ class Whitening:
 
     def flat(self, values: ComplexArray) -> FloatArray:
         """(M, ...) whitened real numbers from coefficients (H + 1, E, ...), without the samples that are left out."""
-        return off(self.free, whiten(self.whitener, values))
+        return self.free.off(whiten(self.whitener, values))
 
     def in_parts(self, values: ComplexArray) -> Parts:
         """The same of coefficients (H + 1, E, k), in parts that add up."""
@@ -117,13 +118,19 @@ class Whitening:
             parts = self._kept[effect, seen[effect]]
             blocks.extend(replace(block, first=block.first + width) for block in parts.blocks)
             width += parts.shape[2]
-        return Parts((self._count, len(self.free), width), tuple(blocks))
+        return Parts((self._count, self._length, width), tuple(blocks))
 
     def factors(self, scale: FloatArray) -> FloatArray:
         """(G,) factor of every part where each equation has its scale (E,)."""
         factors = np.ones(self._count)
         factors[self.parts] = scale
         return factors
+
+    @property
+    def _length(self) -> int:
+        """M."""
+        harmonics, equations = self.whitener.shape[:2]
+        return int(equations * (2 * harmonics - 1))
 
     @property
     def _count(self) -> int:
@@ -141,11 +148,11 @@ class Whitening:
                 places.extend((k, part, begin, end) for k, (begin, end) in enumerate(spans) if end > begin)
         blocks: list[list[Block]] = [[] for _ in columns]
         if flat:
-            rows, taken = np.ascontiguousarray(off(self.free, np.concatenate(flat, axis=1)).T), 0
+            rows, taken = np.ascontiguousarray(self.free.off(np.concatenate(flat, axis=1)).T), 0
             for k, part, begin, end in places:
                 blocks[k].append(Block(part, begin, rows[taken : taken + end - begin]))
                 taken += end - begin
-        shapes = [(self._count, len(self.free), values.shape[2]) for values in columns]
+        shapes = [(self._count, self._length, values.shape[2]) for values in columns]
         return [Parts(shape, tuple(found)) for shape, found in zip(shapes, blocks, strict=True)]
 
 

@@ -1,6 +1,7 @@
 """The noise floor of synthetic scatter is the scatter that was put in, and of a leg that lacks nothing it is right."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.linear import off, whiten
 from sea_ident.discrepancy.noise import (
     closed_freedom_of_many,
+    leverage_of,
     noise_beside_model,
     noise_directions,
     noise_from_steps,
@@ -27,6 +29,11 @@ from sea_ident.simulation import plant_from_robot
 
 HARMONICS = 150
 DRAWS = 400
+
+
+def beside(steps, plain, each, basis):
+    """Noise floor beside what an orthonormal basis takes up."""
+    return noise_beside_model(steps, plain, each, partial(off, basis), leverage_of(basis, plain.equations))
 
 
 def scatter(rng, periods, mixing, offset=0.0):
@@ -93,7 +100,7 @@ def test_what_a_model_leaves_of_means_that_close_has_unit_variance(equations, pe
         each = closed_freedom_of_many(len(steps))
         noise = noise_from_steps(steps, 1.0 / np.mean(np.sum(weights**2, axis=1)), each)
         for _ in range(2):
-            noise = noise_beside_model(steps, noise, each, np.linalg.qr(whiten(noise.whitener(), columns))[0])
+            noise = beside(steps, noise, each, np.linalg.qr(whiten(noise.whitener(), columns))[0])
         basis = np.linalg.qr(whiten(noise.whitener(), columns))[0]
         left = off(basis, whiten(noise.whitener(), mean))
         ratios.append(left @ left / (len(left) - width))
@@ -116,7 +123,7 @@ def test_constants_have_a_real_floor_where_noise_of_equations_is_out_of_phase(eq
         noise = noise_from_steps(steps, periods, step_freedom(periods))
         nothing = np.zeros((equations * (2 * harmonics + 1), 0))
         for _ in range(2):
-            noise = noise_beside_model(steps, noise, step_freedom(periods), nothing)
+            noise = beside(steps, noise, step_freedom(periods), nothing)
         assert not np.any(noise.covariance[0].imag)
         power.append(np.mean(np.abs(_coloured(noise.whitener()[:1], coloured.mean(axis=0)[:1])) ** 2))
     assert np.mean(power) < 1.5
@@ -148,9 +155,9 @@ def test_a_model_that_takes_up_scatter_does_not_lower_the_floor_of_the_rest():
     plain = noise_from_steps(steps_of(residuals), 15, step_freedom(15))
     size = len(stacked(residuals[0]))
     basis = np.linalg.qr(rng.standard_normal((size, size // 4)))[0]
-    beside = noise_beside_model(steps_of(residuals), plain, step_freedom(15), basis)
-    assert np.mean(beside.std / plain.std) == pytest.approx(1.0, abs=0.05)
-    assert beside.total_freedom == pytest.approx(0.75 * plain.total_freedom, rel=0.05)
+    rest = beside(steps_of(residuals), plain, step_freedom(15), basis)
+    assert np.mean(rest.std / plain.std) == pytest.approx(1.0, abs=0.05)
+    assert rest.total_freedom == pytest.approx(0.75 * plain.total_freedom, rel=0.05)
 
 
 def test_what_the_model_takes_up_altogether_is_not_in_its_floor():
@@ -163,9 +170,9 @@ def test_what_the_model_takes_up_altogether_is_not_in_its_floor():
     loud_floor = noise_from_steps(steps_of(loud), 15, step_freedom(15))
     whitener = loud_floor.whitener()
     flat = np.stack([stacked(np.matmul(whitener, unstacked(w, 3)[:, :, None])[:, :, 0]) for w in wild.T], axis=1)
-    beside = noise_beside_model(steps_of(loud), loud_floor, step_freedom(15), np.linalg.qr(flat)[0])
+    rest = beside(steps_of(loud), loud_floor, step_freedom(15), np.linalg.qr(flat)[0])
     assert np.all(loud_floor.std > 10.0 * plain.std)
-    np.testing.assert_allclose(beside.std, plain.std, rtol=0.15)
+    np.testing.assert_allclose(rest.std, plain.std, rtol=0.15)
 
 
 def test_directions_of_white_scatter_are_all():
