@@ -15,6 +15,9 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.linear import FAR_FROM_LOSS, off, span, whiten
 from sea_ident.discrepancy.noise import ComplexArray, leverage_of, stacked, unstacked
 
+FAR_FROM_DEPENDENT = 1e-5
+"""Reciprocal condition number of normalised columns from which on two projections by their products have all digits."""
+
 
 @dataclass(frozen=True, eq=False)
 class FreeColumns:
@@ -60,7 +63,7 @@ class Freed:
         self._equations = [equation for equation, _, _ in columns.blocks]
         touched = whitener[:, :, self._equations]
         self._forth, self._back = touched, np.ascontiguousarray(touched.conj().transpose(0, 2, 1))
-        self._inverse = self._products_inverted()
+        self._inverse, self._digits = self._products_inverted()
 
     @property
     def count(self) -> int:
@@ -96,22 +99,30 @@ class Freed:
             return columns.copy()
         if self._inverse is None:
             return off(self.basis, columns)
-        flat, half = columns.reshape(len(columns), -1), len(self._whitener)
+        left = self._off(columns.reshape(len(columns), -1), self._inverse)
+        return (left if self._digits > FAR_FROM_LOSS else self._off(left, self._inverse)).reshape(columns.shape)
+
+    def _off(self, flat: FloatArray, inverse: FloatArray) -> FloatArray:
+        half = len(self._whitener)
         back = np.matmul(self._back, unstacked(flat, self._whitener.shape[1]))
         parts = [np.concatenate([back[:, i].real, back[:, i].imag]) for i in range(len(self._equations))]
         blocks = [block for _, _, block in self._columns.blocks]
-        amounts = self._inverse @ np.concatenate([b.T @ part for b, part in zip(blocks, parts, strict=True)])
+        amounts = inverse @ np.concatenate([b.T @ part for b, part in zip(blocks, parts, strict=True)])
         taken = np.empty_like(back)
         for i, (_, first, block) in enumerate(self._columns.blocks):
             own = block @ amounts[first : first + block.shape[1]]
             taken[:, i].real, taken[:, i].imag = own[:half], own[half:]
-        return (flat - stacked(np.matmul(self._forth, taken))).reshape(columns.shape)
+        return flat - stacked(np.matmul(self._forth, taken))
 
-    def _products_inverted(self) -> FloatArray | None:
-        """(m, m) inverse of the products of the whitened columns; None where it would lose too many digits."""
+    def _products_inverted(self) -> tuple[FloatArray | None, float]:
+        """(m, m) inverse of the products of the whitened columns; None where these nearly depend on each other.
+
+        And the reciprocal condition number of the columns. Where it is small, a second projection has all the digits
+        that the first one lost.
+        """
         columns = self._columns
         if not columns.count:
-            return np.zeros((0, 0))
+            return np.zeros((0, 0)), 1.0
         products = np.empty((columns.count, columns.count))
         weights = np.matmul(self._back, self._forth)
         half = len(weights)
@@ -125,8 +136,9 @@ class Freed:
                 products[begin : begin + two.shape[1], first : first + one.shape[1]] = block.T
         scale = 1.0 / np.sqrt(np.maximum(np.diagonal(products), 1e-300))
         triangle, failed = scipy.linalg.lapack.dpotrf(products * scale * scale[:, None], lower=1)
-        if failed or scipy.linalg.lapack.dtrcon(triangle, uplo="L")[0] < FAR_FROM_LOSS:
-            return None
+        digits = 0.0 if failed else float(scipy.linalg.lapack.dtrcon(triangle, uplo="L")[0])
+        if digits < FAR_FROM_DEPENDENT:
+            return None, digits
         inverse, _ = scipy.linalg.lapack.dpotri(triangle, lower=1)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        return np.asarray(inverse * scale * scale[:, None], dtype=np.float64)
+        return np.asarray(inverse * scale * scale[:, None], dtype=np.float64), digits
