@@ -11,6 +11,9 @@ import pytest
 # threads would compete for the cores with the processes
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # and so would a second process of each of them
+    os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 
 
 LONG = ("test_readme.py", "test_cli.py", "test_cli_excite.py", "test_distributed.py", "test_demo.py")

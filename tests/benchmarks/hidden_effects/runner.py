@@ -137,6 +137,9 @@ def run_task(task: Task) -> str:
 def run(tasks: list[Task], jobs: int) -> None:
     """Run tasks in parallel; Ctrl-C stops after what is running, and a later run goes on from there."""
     total = len(tasks)
+    if jobs > 1:
+        # each has one core: a second process of a diagnosis would compete with the others
+        os.environ["LOKY_MAX_CPU_COUNT"] = "1"
     with ProcessPoolExecutor(max_workers=jobs) as pool:
         waiting, done = list(tasks), 0
         running: set[Future[str]] = set()
