@@ -41,7 +41,12 @@ def side_by_side(function: Callable[[_Item], _Result], items: Sequence[_Item]) -
     if len(items) < 2 or not second_core():
         yield from map(function, items)
         return
-    copy, results = _Copy(function, items), dict[int, _Result]()
+    try:
+        copy = _Copy(function, items)
+    except OSError:  # no memory or no process left for it
+        yield from map(function, items)
+        return
+    results: dict[int, _Result] = {}
     try:
         for k in range(len(items)):
             while k not in results:

@@ -99,6 +99,14 @@ def test_a_copy_that_stands_still_is_not_waited_for(monkeypatch):
     assert list(side_by_side(slow, range(4))) == [0, 1, 2, 3]
 
 
+def test_where_no_copy_can_be_made_it_is_a_loop(monkeypatch):
+    def full(*_):
+        raise OSError("cannot allocate memory")
+
+    monkeypatch.setattr(multiprocessing.get_context("fork").Process, "start", full)
+    assert {worker for _, worker in side_by_side(where, range(4))} == {os.getpid()}
+
+
 def test_who_stops_asking_stops_the_work():
     results = side_by_side(where, range(100))
     assert next(results)[0] == 0

@@ -102,7 +102,8 @@ class ParameterFits(Tangents):
         flat = stacked(residual)
         nothing = np.zeros((*residual.shape, 0), dtype=np.complex128)
         empty = np.zeros((len(flat), 0))
-        free = Freed(self._plain_whitener(), FreeColumns.of(nothing))
+        unit = np.broadcast_to(np.eye(residual.shape[1], dtype=np.complex128), (*residual.shape, residual.shape[1]))
+        free = Freed(unit, FreeColumns.of(nothing))
         return Fit(effects, columns, values, residual, scale, flat, free, lambda: (empty, nothing), ())
 
     def fit(

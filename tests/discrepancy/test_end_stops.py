@@ -31,7 +31,7 @@ def test_a_soft_stop_is_no_push(laboratory, nothing_missing, top, exponent):
     assert (one.effect, one.joint) == ("external_force", "knee")
     assert one.share < 0.1
     place = float(end + 0.3 * (other - end))
-    own = one.fit.effects[-1]
+    own = one.solution.effects[-1]
     assert own.joint == "knee"
     assert own.end + own.share * own.travel == pytest.approx(place, abs=0.03 * float(np.ptp(q)))
     assert f"knee is {'above' if top else 'below'}" in one.sentence

@@ -136,4 +136,5 @@ def test_a_push_takes_the_place_of_a_law_only_where_it_explains_nearly_all(wrong
     monkeypatch.setattr(module, "settle_again", lambda bench, fit: Settled(fit, now.noise))
     monkeypatch.setattr(module, "physical", lambda *rest: True)
     after = exchange(bench, now, 1, {})
-    assert (after.fit is pushed) is taken
+    assert (after.fit.effects == pushed.effects) is taken
+    assert (after is now) is not taken
