@@ -2,17 +2,20 @@
 
     python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR [--row ROW] [--jobs 2]
     python -m tests.benchmarks.hidden_effects table DIR
+    python -m tests.benchmarks.hidden_effects alone DIR
 
 Robot, true parameters, trajectory, noise, effects, places and sizes of a case follow from the seed, the row and the
 number of the case. Two engines make the recordings: MuJoCo with forces and time stepping of the benchmark's own, and
 the project's simulator. The diagnosis runs in a process of its own that gets the folder `cases/<case>` with the
 recordings and the nominal description; the truth is in `truth/<case>.json`, read by the scores alone. A run that was
-stopped goes on where it was. `table.txt`, `misses.txt` and `confusion.png` are written beside the cases.
+stopped goes on where it was. `table.txt`, `misses.txt` and `confusion.png` are written beside the cases. `alone` times
+those again that took too long side by side with others (of a run with `--keep`).
 """
 
 import argparse
 from pathlib import Path
 
+from tests.benchmarks.hidden_effects.alone import alone
 from tests.benchmarks.hidden_effects.draw import ROWS
 from tests.benchmarks.hidden_effects.runner import Task, run
 from tests.benchmarks.hidden_effects.table import write_report
@@ -35,7 +38,13 @@ def main() -> None:
     runs.add_argument("--generate-only", action="store_true", help="do not diagnose")
     shown = verbs.add_parser("table", help="print the table of a run")
     shown.add_argument("out", type=Path)
+    again = verbs.add_parser("alone", help="time the longest again, one at a time with all cores")
+    again.add_argument("out", type=Path)
     arguments = parser.parse_args()
+    if arguments.verb == "alone":
+        for line in alone(arguments.out):
+            print(line, flush=True)
+        return
     if arguments.verb == "run":
         arguments.out.mkdir(parents=True, exist_ok=True)
         rows = arguments.row or list(ROWS)
