@@ -1,6 +1,7 @@
 """The working bench: models made of effects, fitted to one recording in its noise."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +11,6 @@ from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes, moved
-from sea_ident.discrepancy.freed import Freed
 from sea_ident.discrepancy.linear import off, span
 from sea_ident.discrepancy.noise import (
     ComplexArray,
@@ -80,6 +80,10 @@ class Bench(ParameterFits):
         if not same or data.harmonics != self.data.harmonics:
             raise ValueError(f"{data.source} is another recording, or other periods of it")
         return Bench(data, self.effects, self._evaluated)
+
+    def apart(self) -> "Bench":
+        """The same bench, on which samples may be released that are compared on this one."""
+        return copy(self)
 
     def refine(
         self,
@@ -187,12 +191,9 @@ class Bench(ParameterFits):
         for _ in range(NOISE_ROUNDS):
             whitening = Whitening(self, noise.whitener(), self._free)
             taken = span(whitening.flat(fit.directions))
+            left = off(taken, whitening.flat(steps.transpose(1, 2, 0)))
             leverage = whitening.free.leverage + leverage_of(taken, len(self.data.equations))
-
-            def left(flat: FloatArray, free: Freed = whitening.free, taken: FloatArray = taken) -> FloatArray:
-                return off(taken, free.off(flat))
-
-            noise = noise_beside_model(steps, noise, each, left, leverage)
+            noise = noise_beside_model(left, noise, each, leverage)
         return noise
 
     @cached_property

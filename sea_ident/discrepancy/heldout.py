@@ -73,9 +73,13 @@ class HeldOut:
         return replace(found, processed=self.processed, recording=self.recording, kind=self.kind)
 
     def worth(self, selection: Selection, position: int) -> Transfer:
-        """What one effect of another selection is worth on the same data, by its position in the model."""
-        _, now = _fitted_anew(self.bench, selection)
-        (found,) = transfer(self.bench, selection, now, [position])
+        """What one effect of another selection is worth on the same data, by its position in the model.
+
+        Whatever other selections were tried before it, or are at the same time.
+        """
+        bench = self.bench.apart()
+        _, now = _fitted_anew(bench, selection)
+        (found,) = transfer(bench, selection, now, [position])
         return found
 
 

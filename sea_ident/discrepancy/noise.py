@@ -1,6 +1,6 @@
 """The noise floor, from the periods of the recording itself."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -230,30 +230,23 @@ def leverage_of(basis: FloatArray, equations: int) -> FloatArray:
     return np.concatenate([share[:1].real, (share[1:].real + share[1:].imag) / 2.0])
 
 
-def noise_beside_model(
-    steps: ComplexArray,
-    plain: NoiseFloor,
-    each: float,
-    off: Callable[[FloatArray], FloatArray],
-    leverage: FloatArray,
-) -> NoiseFloor:
+def noise_beside_model(left: FloatArray, plain: NoiseFloor, each: float, leverage: FloatArray) -> NoiseFloor:
     """Noise floor of what a fit leaves: the part of the scatter that it takes up is not in it.
 
     Friction that differs from pass to pass gathers around reversals. Samples left out and columns of friction take
     most of it up in the mean residual, so it must not count as noise of what remains.
 
     Args:
-        steps: (S, H + 1, E) differences of the residuals of successive periods over the root of two.
+        left: (M, S) differences of the residuals of successive periods over the root of two, whitened by `plain`, less
+            what everything that is free takes up of them.
         plain: noise floor of the residuals as they are.
         each: degrees of freedom of a variance from these steps.
-        off: takes out of columns (M, S), whitened by `plain`, what everything that is free takes up of them.
         leverage: (H + 1, E) share of the noise of every coefficient that it takes up [-].
 
     Returns:
         The noise floor.
     """
     whitener, count = plain.whitener(), plain.equations
-    flat = off(stacked(np.matmul(whitener, steps.transpose(1, 2, 0)))).T
     colour = np.linalg.inv(whitener)
     size = np.linalg.norm(colour, axis=2)
     # levelled by a floor that is smoothed more than the new one: one as rough as that follows the very steps, and what
@@ -264,7 +257,7 @@ def noise_beside_model(
     mean[0] = mean[0].real
     typical = np.linalg.cholesky(mean)
     rest = Rest(np.asarray(np.linalg.solve(typical, own), dtype=np.complex128), 1.0 - leverage)
-    level = np.stack([np.matmul(rest.colour, unstacked(f, count)[:, :, None])[:, :, 0] for f in flat])
+    level = np.stack([np.matmul(rest.colour, unstacked(f, count)[:, :, None])[:, :, 0] for f in left.T])
     inside = noise_from_steps(level, plain.periods, each, rest)
     back = typical * size[:, :, None]
     covariance = np.matmul(np.matmul(back, inside.covariance), back.conj().transpose(0, 2, 1))

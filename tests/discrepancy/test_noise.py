@@ -1,7 +1,6 @@
 """The noise floor of synthetic scatter is the scatter that was put in, and of a leg that lacks nothing it is right."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -33,7 +32,8 @@ DRAWS = 400
 
 def beside(steps, plain, each, basis):
     """Noise floor beside what an orthonormal basis takes up."""
-    return noise_beside_model(steps, plain, each, partial(off, basis), leverage_of(basis, plain.equations))
+    left = off(basis, whiten(plain.whitener(), steps.transpose(1, 2, 0)))
+    return noise_beside_model(left, plain, each, leverage_of(basis, plain.equations))
 
 
 def scatter(rng, periods, mixing, offset=0.0):
