@@ -9,7 +9,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.conclude import _shape_parameters
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import simplest_first
-from sea_ident.discrepancy.described import begin_as_described
+from sea_ident.discrepancy.described import begin_as_described, from_described_springs
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle
@@ -59,6 +59,18 @@ def test_a_large_error_of_an_encoder_is_found(laboratory, effect, joint):
     for name, value in LARGE[effect].items():
         assert getattr(found.effects[0], name) == pytest.approx(value, rel=0.01)
     assert found.final.fit.statistic < 1.2 * found.final.fit.dof
+
+
+def test_what_is_far_above_what_is_of_interest_is_not_begun_again(laboratory, monkeypatch):
+    bench = laboratory.bench(laboratory.record([("encoder_offset", "hip", [], LARGE["encoder_offset"])], periods=6))
+    start = settle(bench, bench.effects)
+    begun = bench.anchored((*start.fit.effects, make_effect("encoder_offset", "hip")), start.fit.parameters)
+    wrong = bench.fit(begun, start.noise, start=start.fit.parameters)
+    position, parameters = len(bench.effects), start.fit.parameters
+    right = from_described_springs(bench, wrong, position, start.noise, parameters, wrong.statistic / 10.0)
+    assert right.effects[-1].offset == pytest.approx(LARGE["encoder_offset"]["offset"], rel=0.05)
+    monkeypatch.setattr("sea_ident.discrepancy.described.begin_as_described", lambda *_: pytest.fail("begun again"))
+    assert from_described_springs(bench, wrong, position, start.noise, parameters, wrong.statistic / 100.0) is wrong
 
 
 @pytest.mark.slow

@@ -63,6 +63,23 @@ def test_what_one_of_several_effects_is_worth_is_what_it_is_among_all(laboratory
     assert found.transfers[0] != found.transfers[1]
 
 
+def test_what_an_effect_is_worth_does_not_depend_on_what_was_tried_before(laboratory, ripple, with_ripple):
+    """A torque that comes late jumps after the motor turned back: these samples are left out for it alone."""
+    bench, selection = ripple
+    found, _ = held_out(bench, selection, with_ripple)
+    fit, position = selection.final.fit, len(selection.final.fit.effects) - 1
+    late = (*fit.effects[:-1], make_effect("torque_delay", "knee", delay=0.03))
+    other = Settled(bench.fit(late, selection.final.noise, start=fit.parameters), selection.final.noise)
+    before, compared = found.worth(selection, position), found.bench.freed(None).count
+    rival = found.worth(replace(selection, final=other), position)
+    assert rival != before
+    assert found.bench.freed(None).count == compared
+    assert found.worth(selection, position) == before
+    apart = found.bench.apart()
+    apart.release(late)
+    assert apart.freed(None).count > compared == found.bench.freed(None).count
+
+
 def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
     """Whatever sensors and friction made of it, and wherever in it the recording begins."""
     again = laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, seed=9)

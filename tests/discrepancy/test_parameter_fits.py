@@ -1,5 +1,7 @@
 """Parameters of a model fitted with its shapes held."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,18 @@ def test_a_planted_effect_is_fitted_within_its_own_standard_errors(rippled):
     for k, planted in zip(found, (1.0, 0.5), strict=True):
         assert fit.values[k] == pytest.approx(planted, abs=4.0 * fit.std(k))
         assert fit.std(k) < 0.06
+
+
+def test_a_fit_comes_again_from_what_it_came_to(rippled):
+    """To the last digit, whatever process it was found in, with and without free shapes."""
+    bench, _, now = rippled
+    held = bench.fit(now.fit.effects, now.noise, start=now.fit.parameters, tangents=False)
+    for fit in (now.fit, bench.again(held.solution, now.noise)):
+        again = bench.again(pickle.loads(pickle.dumps(fit.solution)), now.noise)
+        assert again.effects == fit.effects
+        assert (again.statistic, again.dof, again.parameters) == (fit.statistic, fit.dof, fit.parameters)
+        for name in ("values", "residual", "scale", "whitened", "flat", "basis", "covariance_factor"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(fit, name), err_msg=name)
 
 
 def test_a_shape_is_refined_beside_what_is_known(laboratory):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident import side_by_side
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
@@ -28,6 +29,22 @@ def unequal(laboratory):
     ]
     bench = laboratory.bench(laboratory.record(planted, periods=10))
     return bench, search(bench, bench.effects)
+
+
+def test_two_processes_find_what_one_does(unequal, monkeypatch):
+    """To the last digit."""
+    bench, alone = unequal
+    copies = []
+    make = side_by_side._Copy.__init__
+    monkeypatch.setattr(side_by_side._Copy, "__init__", lambda *args: copies.append(make(*args)))
+    monkeypatch.setattr(side_by_side, "_cores", lambda: 2)
+    both = search(Bench(bench.data, bench.effects), bench.effects)
+    assert copies or not side_by_side.second_core()
+    assert both.effects == alone.effects
+    assert both.p_values == alone.p_values
+    assert both.final.fit.parameters == alone.final.fit.parameters
+    assert both.final.fit.statistic == alone.final.fit.statistic
+    assert [(c.key, c.gain) for c in both.candidates] == [(c.key, c.gain) for c in alone.candidates]
 
 
 def test_a_small_effect_at_another_joint_is_found_beside_a_large_one(unequal):
