@@ -43,6 +43,12 @@ difference to which of them promises most, and every one of them would be evalua
 ELSEWHERE_DIGITS = 1
 """... and those for what depends on where the links are, not on how much a spring gives."""
 
+ROUGHLY = 1e-4
+"""Share of the gain of the best shape that single precision does not tell from nothing, ..."""
+
+EXACTLY = 1e-9
+"""... and that double precision does not."""
+
 ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
 
@@ -78,6 +84,11 @@ class Candidate:
     def key(self) -> Key:
         """What makes it this candidate, whatever its shape."""
         return effect_key(self.effect)
+
+    @property
+    def size(self) -> float:
+        """Of what it does to the model, in units of the noise, a part of which the model takes up [-]."""
+        return float(np.sqrt(np.sum(self.values**2 * self.raw_power)))
 
     @property
     def absorbed(self) -> float:
@@ -151,14 +162,14 @@ def scan(
         across = fit.off(fit.off(columns))
         begin = 0
         for each in some:
-            best: Candidate | None = None
+            shaped: list[Candidate] = []
             for effect, norms in zip(each.variants, each.norms, strict=True):
                 own = across[:, begin : begin + len(norms)].copy()
                 begin += len(norms)
-                candidate = _exactly(bench, fit, left, effect, own, norms, each.tests)
-                if best is None or candidate.gain > best.gain:
-                    best = candidate
-            if best is not None:
+                shaped.append(_exactly(bench, fit, left, effect, own, norms, each.tests))
+            if shaped:
+                order = _best_last(np.array([c.gain for c in shaped]), np.array([c.size for c in shaped]), EXACTLY)
+                best = shaped[order[-1]]
                 found.append(replace(best, effect=_with_smoothing_of(each.effect, best.effect)))
     return sorted(found, key=lambda c: (-float(f"{c.gain:.9g}"), penalty(c.effect, bench)))
 
@@ -288,9 +299,10 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
             gains = np.where(modest, gains, -1.0)
     # those that single precision leaves in doubt are looked at one by one, as are the best
     doubtful = {int(v) for v in np.flatnonzero(~visible.all(axis=1))} if count <= FEW_SHAPES else set()
-    tries = doubtful | {int(v) for v in np.argsort(np.where(allowed, gains, -1.0))[-2:]}
+    strengths = np.sqrt(np.sum((values * norms.reshape(count, width)) ** 2, axis=1))
+    tries = doubtful | {int(v) for v in _best_last(np.where(allowed, gains, -1.0), strengths, ROUGHLY)[-2:]}
     if width > 1:
-        tries |= {int(v) for v in np.argsort(gains)[-2:]}
+        tries |= {int(v) for v in _best_last(gains, strengths, ROUGHLY)[-2:]}
     return _Promising(
         effect=anchored,
         variants=tuple(variants[v] for v in tries),
@@ -298,6 +310,14 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
         norms=tuple(norms.reshape(count, width)[v] for v in tries),
         tests=count,
     )
+
+
+def _best_last(gains: FloatArray, sizes: FloatArray, same: float) -> IntArray:
+    """Order of shapes by their gains, the smallest last of those that do the same but for this share of the largest.
+
+    Rounding would choose among them, and not in the same way on every machine.
+    """
+    return np.lexsort((-sizes, np.round(gains / max(float(np.max(np.abs(gains))), 1e-300) / same)))
 
 
 def _inner_products(columns: NDArray[np.floating], width: int) -> FloatArray:

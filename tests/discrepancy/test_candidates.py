@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from sea_ident.discrepancy import candidates, periods
-from sea_ident.discrepancy.candidates import FEW_SHAPES, candidate_effects, scan
+from sea_ident.discrepancy.candidates import EXACTLY, FEW_SHAPES, _best_last, candidate_effects, scan
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.settle import settle
@@ -136,3 +136,13 @@ def test_beside_a_ripple_another_is_tried_until_there_are_enough(nothing_missing
         return [e.number for e in found if e.name == "torque_ripple" and e.joint == "hip"]
 
     assert [tried(), tried(1), tried(1, 2), tried(2), tried(1, 2, 3)] == [[1], [2], [3], [1], []]
+
+
+@pytest.mark.parametrize("rounding", [-1e-12, 0.0, 1e-12])
+def test_of_shapes_that_do_the_same_the_smallest_is_taken_whatever_rounding_says(rounding):
+    gains, sizes = np.array([800.0, 7000.0, 7000.0 * (1.0 + rounding), -1.0]), np.array([0.1, 2.0, 1.0, 0.0])
+    assert list(_best_last(gains, sizes, EXACTLY)) == [3, 0, 1, 2]
+    assert list(_best_last(gains, sizes[[0, 2, 1, 3]], EXACTLY)) == [3, 0, 2, 1]
+    # more is more, whatever it takes
+    assert list(_best_last(gains * [1.0, 1.0 + 1e-6, 1.0, 1.0], sizes, EXACTLY)) == [3, 0, 2, 1]
+    assert list(_best_last(-np.ones(2), np.array([1.0, 2.0]), EXACTLY)) == [1, 0]
