@@ -5,12 +5,14 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit, Known
-from sea_ident.discrepancy.free_shapes import free_shapes, moved
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, room
 from sea_ident.discrepancy.linear import off, span
 from sea_ident.discrepancy.noise import (
     ComplexArray,
@@ -133,11 +135,15 @@ class Bench(ParameterFits):
         if not np.any(strength > 1e-9):
             return None
         seen = strength > 1e-9
-        step = np.zeros(len(strength))
         # every shape in its own unit: what one does may be a thousand times what another does
         unit = across[:, seen] / strength[seen]
         normal = unit.T @ unit + np.diag(RIDGE + HELD / strength[seen] ** 2)
-        step[seen] = np.clip(np.linalg.solve(normal, unit.T @ fit.whitened) / strength[seen], -1.0, 1.0)
+        rooms = np.array([room(fit.effects[position], shape) for position, shape in shapes]).T
+        step = np.zeros(len(strength))
+        step[seen] = _within(normal, unit.T @ fit.whitened, rooms[:, seen] * strength[seen]) / strength[seen]
+        step = np.clip(step, -1.0, 1.0)
+        if not np.any(step):
+            return None
         follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis.T @ directions)
         for _ in range(5):
             effects = list(fit.effects)
@@ -201,3 +207,16 @@ class Bench(ParameterFits):
         """(E,) rms of the motor torque of the joint that each equation belongs to [N m]."""
         rms = np.sqrt(np.mean(self.data.tau_motor**2, axis=0))
         return np.asarray(rms[[equation.index for equation in self.data.equations]], dtype=np.float64)
+
+
+def _within(normal: FloatArray, gradient: FloatArray, rooms: FloatArray) -> FloatArray:
+    """(s,) least squares step by its normal equations (s, s), (s,) within rooms (2, s) below and above.
+
+    Where one shape stands at the end of its range, the others have another way than they would have beside it.
+    """
+    step = np.linalg.solve(normal, gradient)
+    if np.all((step >= rooms[0]) & (step <= rooms[1])):
+        return np.asarray(step, dtype=np.float64)
+    root = np.linalg.cholesky(normal)
+    found = lsq_linear(root.T, solve_triangular(root, gradient, lower=True), rooms, method="bvls")
+    return np.asarray(found.x, dtype=np.float64)

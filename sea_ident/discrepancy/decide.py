@@ -25,10 +25,6 @@ Alternatives = dict[int, tuple[Alternative, ...]]
 CLEARLY = 1.0
 """What a simpler effect must save, in units of the statistic."""
 
-UNDECIDED = 0.1
-"""Share of what neither explains on the other motion that a difference between two must exceed [-]: something else is
-wrong there, and could lean to either."""
-
 OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 """Factors by which a shape is moved where it may be open."""
 
@@ -188,7 +184,7 @@ class _Comparison:
         if fit is None or _twice(fit, self.position, self.selection.added):
             return None
         replaced = replace(self.selection, final=Settled(fit, self.selection.final.noise))
-        return self.held.worth(replaced, self.position)
+        return self.held.worth(replaced, self.position, self.own)
 
 
 def _with_another_shape(
@@ -238,7 +234,7 @@ class _OpenShapes:
         self, bench: Bench, selection: Selection, held: HeldOut, position: int, fit: Fit, found: Transfer
     ) -> None:
         self._bench, self._selection, self._held, self._position = bench, selection, held, position
-        self._found = found
+        self._found, self._own = found, held.transfers[position - len(fit.effects) + selection.added]
         # each compared with the fit as it was found in one and the same noise floor
         self._noise = bench.noise(fit)
         self._base = bench.fit(fit.effects, self._noise, start=fit.parameters)
@@ -254,7 +250,8 @@ class _OpenShapes:
             worse = other.statistic - base.statistic > EQUALLY_GOOD * base.unit
             if worse or not physical(bench, other, self._position):
                 break
-            result = self._held.worth(replace(self._selection, final=Settled(other, self._noise)), self._position)
+            replaced = replace(self._selection, final=Settled(other, self._noise))
+            result = self._held.worth(replaced, self._position, self._own)
             shown.append((other.solution, result))
             if result.statistic > last.statistic - EQUALLY_GOOD * last.unit:
                 break
@@ -288,4 +285,4 @@ def _better(one: Transfer, other: Transfer) -> bool:
     if other.remembers and not one.remembers and one.statistic - other.statistic < EQUALLY_GOOD * one.unit:
         # what is foretold is worth more than what is fitted there
         return True
-    return other.statistic - one.statistic > max(EQUALLY_GOOD * one.unit, UNDECIDED * one.excess)
+    return other.statistic - one.statistic > one.margin

@@ -98,6 +98,17 @@ def moved(effect: Effect, shape: Shape, step: float) -> Effect:
     return replace(effect, **{shape.name: within})  # type: ignore[arg-type]
 
 
+def room(effect: Effect, shape: Shape) -> tuple[float, float]:
+    """How far `moved` can move a shape down and up, in its steps; one that was given outside its range only inwards."""
+    value = float(getattr(effect, shape.name))
+    ends = min(shape.lower, value), max(shape.upper, value)
+    if shape.logarithmic:
+        low, high = (float(np.log(end / value)) if end > 0.0 else -np.inf for end in ends)
+    else:
+        low, high = ((end - value) / (shape.upper - shape.lower) for end in ends)
+    return low, high
+
+
 def distance(low: Effect, high: Effect, shape: Shape) -> float:
     """How far a shape moved from one effect to another, in the coordinates of `moved`: less at the end of its range."""
     first, last = float(getattr(low, shape.name)), float(getattr(high, shape.name))

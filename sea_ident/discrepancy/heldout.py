@@ -17,7 +17,7 @@ from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
-from sea_ident.discrepancy.transfer import Transfer, transfer
+from sea_ident.discrepancy.transfer import Transfer, far_behind, transfer
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.exceptions import SeaIdentWarning
@@ -45,6 +45,7 @@ class HeldOut:
         before: the model without the effects on them.
         after: the model with the effects on them.
         noise: noise floor there.
+        now: the model with the effects fitted to them.
         transfers: one per effect that was added.
         source: what the data are.
         processed: the other recording; None where other periods of the same one were held out.
@@ -56,6 +57,7 @@ class HeldOut:
     before: Fit
     after: Fit
     noise: NoiseFloor
+    now: Settled
     transfers: tuple[Transfer, ...]
     source: str
     processed: ProcessedRecording | None = None
@@ -72,11 +74,16 @@ class HeldOut:
         found = tried(self.bench, selection, self.source)
         return replace(found, processed=self.processed, recording=self.recording, kind=self.kind)
 
-    def worth(self, selection: Selection, position: int) -> Transfer:
+    def worth(self, selection: Selection, position: int, beside: Transfer | None = None) -> Transfer:
         """What one effect of another selection is worth on the same data, by its position in the model.
 
-        Whatever other selections were tried before it, or are at the same time.
+        Whatever other selections were tried before it, or are at the same time. What is far behind another effect
+        (`beside`) is not fitted anew.
         """
+        if beside is not None:
+            behind = far_behind(self.bench, selection, self.now, position, beside)
+            if behind is not None:
+                return behind
         bench = self.bench.apart()
         _, now = _fitted_anew(bench, selection)
         (found,) = transfer(bench, selection, now, [position])
@@ -162,7 +169,7 @@ def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     before = _as_found(other, start, selection)
     after, now = _fitted_anew(other, selection)
     transfers = tuple(transfer(other, selection, now)) if selection.added else ()
-    return HeldOut(other, before, after, other.noise(after), transfers, source)
+    return HeldOut(other, before, after, other.noise(after), now, transfers, source)
 
 
 def _fitted_anew(other: Bench, selection: Selection) -> tuple[Fit, Settled]:

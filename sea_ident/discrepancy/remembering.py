@@ -78,7 +78,7 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
     fits = [fit for element, start in tried if (fit := _here(bench, selection, position, element, start)) is not None]
 
     def left(fit: Fit) -> float:
-        return held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position).excess
+        return held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position, found).excess
 
     best = min(zip(side_by_side(left, fits), range(len(fits)), strict=True), default=None)
     if best is None or best[0] > found.excess * (MOST_OF_IT if found.share > CONFIRMED else 1.0):

@@ -50,6 +50,10 @@ leave something at certain times of a period too, and a push fits there [-]."""
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
+FAR_FROM_RIGHT = 30.0
+"""Statistic over degrees of freedom beyond which others are tried in the place of what was added only when there is
+nothing more to add: so much is missing beside it that the best in its place is hardly the right one."""
+
 HOPELESS = 100.0
 """Statistic over degrees of freedom beyond which no further effect is looked for, ..."""
 
@@ -118,29 +122,49 @@ def search(
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
         largest = _largest_changes(bench, now.fit, len(added))
+    waits = False
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
-        if len(added) >= MOST_EFFECTS:
-            break
-        step = next_effect(bench, now, candidates, tests, np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest), tried)
+        step = None
+        if len(added) < MOST_EFFECTS:
+            smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
+            step = next_effect(bench, now, candidates, tests, smallest, tried)
+        if step is None and waits:
+            last, waits = now, False
+            now = _improved(bench, now, len(added), tried, ruled_out)
+            if now is not last:
+                continue
         if step is None:
             break
         new, p_value = step
         largest = np.maximum(largest, visible_changes(bench, now.fit, new))
         added.append(p_value)
         last = now
-        now = _improved(bench, _settled(bench, settle_again(bench, new)), len(added), tried, ruled_out)
-        lost = len(added) > 1 and now.fit.statistic > HOPELESS * now.fit.dof
-        if lost and now.fit.excess > SLOW * last.fit.excess:
+        now = _settled(bench, settle_again(bench, new))
+        waits = now.fit.statistic > FAR_FROM_RIGHT * now.fit.dof
+        waits = waits and not _lost(now, last, len(added)) and _possible(bench, now, len(added))
+        now = _formed(bench, now) if waits else _improved(bench, now, len(added), tried, ruled_out)
+        if _lost(now, last, len(added)):
             break
-        if not all(possible(bench, now.fit, now.noise, -k) for k in range(1, len(added) + 1)):
+        if not _possible(bench, now, len(added)):
             added.pop()
             now = last
             break
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
     now, added = _eliminate(bench, now, added, tests)
     return replace(whole, final=now, added=len(added), p_values=tuple(added), whole=whole)
+
+
+def _lost(now: Settled, last: Settled, added: int) -> bool:
+    """Whether a second or later effect left so much, that the library does not have what is missing."""
+    far = added > 1 and now.fit.statistic > HOPELESS * now.fit.dof
+    return far and now.fit.excess > SLOW * last.fit.excess
+
+
+def _possible(bench: Bench, now: Settled, added: int) -> bool:
+    """Whether all effects that were added are possible together."""
+    return all(possible(bench, now.fit, now.noise, -k) for k in range(1, added + 1))
 
 
 def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key]) -> Settled:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
@@ -24,6 +25,13 @@ TRANSFERS = 0.5
 TRANSFERS_ALONE = 0.7
 """... and the same where nothing else is missing that could spoil it: then it holds in part only."""
 
+UNDECIDED = 0.1
+"""Share of what neither explains on the other motion that a difference between two must exceed [-]: something else is
+wrong there, and could lean to either."""
+
+FAR_BEHIND = 5.0
+"""Times the difference that tells two apart by which one is far behind: not the better one in any noise floor [-]."""
+
 
 @dataclass(frozen=True)
 class Transfer:
@@ -44,6 +52,11 @@ class Transfer:
     unit: float = 1.0
     excess: float = 0.0
     remembers: bool = False
+
+    @property
+    def margin(self) -> float:
+        """By how much more of the statistic another must leave to be the worse one beyond doubt."""
+        return max(EQUALLY_GOOD * self.unit, UNDECIDED * self.excess)
 
     @property
     def holds(self) -> bool:
@@ -74,6 +87,34 @@ def transfer(
     return list(side_by_side(lambda position: _Trial(bench, fit, added, now, position).outcome(), wanted))
 
 
+def far_behind(bench: Bench, selection: Selection, now: Settled, position: int, beside: Transfer) -> Transfer | None:
+    """What an effect is worth on other data where that is far less than another is, without a fit to them.
+
+    Args:
+        bench: the other data.
+        selection: what was found, with the effect.
+        now: what was found with the other, fitted anew to the other data, with the noise floor there.
+        position: of the effect in the model.
+        beside: what the other is worth.
+
+    Returns:
+        A transfer that does not hold; None where the effect is not far behind.
+    """
+    fit, unit = selection.final.fit, now.fit.unit
+    added = range(len(fit.effects) - selection.added, len(fit.effects))
+    fixed, remembers = _Trial(bench, fit, added, now, position).as_found()
+    if fixed.statistic - beside.statistic < FAR_BEHIND * beside.margin:
+        return None
+    return Transfer(0.0, True, fixed.statistic, unit, fixed.excess, remembers)
+
+
+class _AsFound(NamedTuple):
+    """A model with an effect as it was found, and whether that needs a constant torque of its own."""
+
+    fit: Fit
+    remembers: bool
+
+
 class _Trial:
     """One effect of a model on data that it was not fitted to.
 
@@ -92,17 +133,20 @@ class _Trial:
         # friction may turn over as it does at the speeds of the other motion: that is no matter of what was added
         self._models = list(dict.fromkeys(effects[: added.start] for effects in (fit.effects, now.fit.effects)))
 
-    def outcome(self) -> Transfer:
-        """What the effect is worth beside all others that were added, these as they are."""
-        signals = [self._fit.effects[p] for p in self._others if isinstance(self._fit.effects[p], SignalEffect)]
-        beside = [*signals, *self._history(self._others)]
-        known, whole = (as_known(self._bench, self._fit, positions) for positions in (self._others, self._added))
-        without, fixed = self._least(known, beside), self._least(whole, beside, self._signal())
-        unit, remembers = self._now.fit.unit, False
+    def as_found(self) -> _AsFound:
+        """The effect beside all others that were added, all with their parameters as they are."""
+        whole, beside = as_known(self._bench, self._fit, self._added), self._beside()
+        fixed = self._least(whole, beside, self._signal())
         if own_history := self._history([self._position]):
             rested = self._least(whole, beside, own_history)
-            remembers = fixed.statistic - rested.statistic > EQUALLY_GOOD * unit
-            fixed = rested if remembers else fixed
+            if fixed.statistic - rested.statistic > EQUALLY_GOOD * self._now.fit.unit:
+                return _AsFound(rested, True)
+        return _AsFound(fixed, False)
+
+    def outcome(self) -> Transfer:
+        """What the effect is worth beside all others that were added, these as they are."""
+        known = as_known(self._bench, self._fit, self._others)
+        without, (fixed, remembers), unit = self._least(known, self._beside()), self.as_found(), self._now.fit.unit
 
         def alone() -> Fit:
             """With its parameters and shapes free, those of the others as they are."""
@@ -117,6 +161,11 @@ class _Trial:
                 tested = self._tells(without, alone().statistic)
             share = max(share, self._share_beside_free())
         return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
+
+    def _beside(self) -> list[Effect]:
+        """What stands beside the torque of the others that is known: their signals, and what their springs remember."""
+        signals = [self._fit.effects[p] for p in self._others if isinstance(self._fit.effects[p], SignalEffect)]
+        return [*signals, *self._history(self._others)]
 
     def _share_beside_free(self) -> float:
         """Share of what the effect could explain that it does, all others fitted anew; 0 where these leave it none."""

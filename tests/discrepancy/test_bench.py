@@ -1,0 +1,51 @@
+"""Shapes refined together with the parameters."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, room
+from sea_ident.discrepancy.settle import settle
+from sea_ident.effects import make_effect
+
+PUSH = {"start": 2.0, "stop": 3.0, "period": 5.0}
+
+
+@pytest.fixture(scope="module")
+def pushed(laboratory):
+    """A shank that is pushed farther from its centre of mass than any push is looked for."""
+    planted = [("external_force", "knee", [8.0, 0.0, 5.0], {**PUSH, "point_x": 0.1, "point_z": -0.8})]
+    bench = laboratory.bench(laboratory.record(planted, periods=5))
+    return bench, settle(bench, bench.effects)
+
+
+@pytest.mark.parametrize(("x", "z"), [(0.2, -0.5), (-0.2, -0.5), (0.3, 0.2)])
+def test_a_shape_at_the_end_of_its_range_does_not_hold_up_the_others(pushed, x, z):
+    """However it begins: where the fit ends, no shape that can move brings the statistic down."""
+    bench, start = pushed
+    push = make_effect("external_force", "knee", **PUSH, point_x=x, point_y=0.001, point_z=z)
+    model, only = (*start.fit.effects, push), len(start.fit.effects)
+    fit = bench.refine(model, start.noise, start=start.fit.parameters, only=only)
+    assert fit.effects[-1].point_z == -0.5
+    for position, shape in free_shapes(fit.effects):
+        if position < only:
+            continue
+        for step in (-0.01, 0.01):
+            effects = list(fit.effects)
+            effects[position] = moved(effects[position], shape, step)
+            other = bench.fit(effects, start.noise, start=fit.parameters, tangents=False)
+            assert other.statistic > fit.statistic - 0.05 - 1e-3 * fit.excess, (shape.name, step)
+
+
+def test_a_shape_has_the_room_that_is_left_in_its_range():
+    play = make_effect("backlash", "knee", half_width=0.01)
+    width = next(shape for shape in play.shapes if shape.name == "half_width")
+    low, high = room(play, width)
+    assert low < 0.0 < high
+    assert (moved(play, width, low).half_width, moved(play, width, high).half_width) == pytest.approx(
+        (width.lower, width.upper)
+    )
+    assert room(make_effect("backlash", "knee", half_width=width.upper), width)[1] == 0.0
+    push = make_effect("external_force", "knee", point_x=0.7)
+    point = next(shape for shape in push.shapes if shape.name == "point_x")
+    assert room(push, point) == pytest.approx((-1.2, 0.0))
+    assert np.isfinite(room(push, point)).all()
