@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -49,12 +50,27 @@ STANDS_STILL = 1e-3
 HOPE = 10.0
 """How many times the gain of the last step all further ones together may bring: steps that shrink by a tenth each."""
 
-HELD = 1.0
-"""Information about a shape (for its logarithm, or as a share of its range) below which it stays where it is: noise
-would carry it anywhere, and hold up the others."""
+CAREFUL = ((1.0, 1.0), (100.0, 1.0), (1e3, 1.0 / 3.0), (3e4, 1.0 / 9.0), (1e6, 1.0 / 81.0))
+"""How careful a step is, more and more so where it makes a fit worse. The information about a shape (for its logarithm,
+or as a share of its range) below which it stays about where it is: noise would carry it anywhere, and the motion bends
+what it shows so little of long before. And the part of the step that is taken: so that what is plain is not held up by
+what is not, the information comes first."""
 
 RIDGE = 1e-6
 """Keeps steps of shapes finite that do the same, as a share of what each does."""
+
+
+@dataclass
+class _Caution:
+    """What a refinement has learnt of the steps that it can take.
+
+    Attributes:
+        level: how careful the last step had to be, in `CAREFUL`.
+        held: positions of effects of which the shapes stay: each would run away.
+    """
+
+    level: int = 0
+    held: set[int] = field(default_factory=set)
 
 
 class Bench(ParameterFits):
@@ -113,8 +129,9 @@ class Bench(ParameterFits):
             The fit.
         """
         fit = self.fit(effects, noise, start=start, tangents=False, known=known)
+        caution = _Caution()
         for _ in range(rounds):
-            better = self._refine_step(fit, noise, only)
+            better = self._refine_step(fit, noise, only, caution)
             if better is None:
                 break
             gain = fit.statistic - better.statistic
@@ -123,8 +140,8 @@ class Bench(ParameterFits):
                 break
         return self.fit(fit.effects, noise, start=fit.parameters, known=known)
 
-    def _refine_step(self, fit: Fit, noise: NoiseFloor, only: int) -> Fit | None:
-        shapes = tuple((k, shape) for k, shape in free_shapes(fit.effects) if k >= only)
+    def _refine_step(self, fit: Fit, noise: NoiseFloor, only: int, caution: "_Caution") -> Fit | None:
+        shapes = tuple((k, s) for k, s in free_shapes(fit.effects) if k >= only and k not in caution.held)
         if not shapes:
             return None
         bent = self.tangents(fit.effects, fit.columns, fit.values, shapes)
@@ -132,43 +149,56 @@ class Bench(ParameterFits):
         directions = self.whitening(noise).flat(tangents)
         across = off(fit.basis, directions)  # the samples that are left out are out of them already
         strength = np.linalg.norm(across, axis=0)
-        if not np.any(strength > 1e-9):
-            return None
         seen = strength > 1e-9
+        if not np.any(seen):
+            return None
         # every shape in its own unit: what one does may be a thousand times what another does
         unit = across[:, seen] / strength[seen]
-        normal = unit.T @ unit + np.diag(RIDGE + HELD / strength[seen] ** 2)
-        rooms = np.array([room(fit.effects[position], shape) for position, shape in shapes]).T
-        step = np.zeros(len(strength))
-        step[seen] = _within(normal, unit.T @ fit.whitened, rooms[:, seen] * strength[seen]) / strength[seen]
-        step = np.clip(step, -1.0, 1.0)
-        if not np.any(step):
-            return None
+        normal, gradient = unit.T @ unit, unit.T @ fit.whitened
+        rooms = np.array([room(fit.effects[position], shape) for position, shape in shapes]).T[:, seen] * strength[seen]
         follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis.T @ directions)
-        for _ in range(5):
-            effects = list(fit.effects)
-            for (position, shape), amount in zip(shapes, step, strict=True):
-                effects[position] = moved(effects[position], shape, float(amount))
-            # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
-            ahead = fit.values + follow @ step
-            start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
-            new = self.fit(effects, noise, start=start, tangents=False, known=fit.known)
-            slack = len(self.slack_links(new)) > len(self.slack_links(fit))
-            if new.statistic < fit.statistic and not slack and not self._runs_away(fit, new):
-                return new
-            step = step / 3.0
+        held = np.zeros(len(shapes), dtype=bool)
+        for level in range(max(caution.level - 1, 0), len(CAREFUL)):
+            needed, part = CAREFUL[level]
+            while True:
+                free = ~held[seen]
+                step, damping = np.zeros(len(strength)), np.diag(RIDGE + needed / strength[seen] ** 2)
+                inner = np.zeros(len(free))
+                inner[free] = _within((normal + damping)[np.ix_(free, free)], gradient[free], rooms[:, free])
+                step[seen] = part * np.clip(inner / strength[seen], -1.0, 1.0)
+                effects = list(fit.effects)
+                for (position, shape), amount in zip(shapes, step, strict=True):
+                    effects[position] = moved(effects[position], shape, float(amount))
+                if tuple(effects) == fit.effects:
+                    return None
+                # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
+                ahead = fit.values + follow @ step
+                start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
+                new = self.fit(effects, noise, start=start, tangents=False, known=fit.known)
+                if not new.statistic < fit.statistic or len(self.slack_links(new)) > len(self.slack_links(fit)):
+                    break
+                away = self._run_away(fit, new)
+                if not away:
+                    caution.level = level
+                    return new
+                # the others have a way of their own, and need not creep along beside it
+                out = np.array([position in away for position, _ in shapes]) & ~held
+                if not np.any(out):
+                    break
+                held |= out
+                caution.held |= away
         return None
 
-    def _runs_away(self, before: Fit, after: Fit) -> bool:
-        """Whether an effect beside the model becomes large by a step of its shape: others then cancel it."""
-        counts = self.counts(after.effects)
+    def _run_away(self, before: Fit, after: Fit) -> set[int]:
+        """Positions of effects beside the model that become large by a step of the shapes: others then cancel them."""
+        counts, found = self.counts(after.effects), set()
         for position in range(len(self.effects), len(after.effects)):
             own = slice(sum(counts[:position]), sum(counts[: position + 1]))
             torques = [self.column_spectra(f.effects[position], f.effects) @ f.values[own] for f in (before, after)]
             sizes = [np.sqrt(np.sum(np.abs(torque) ** 2, axis=0)) for torque in torques]
             if np.any((sizes[1] > RUNAWAY * self.torque_rms) & (sizes[1] > RUNAWAY_STEP * sizes[0])):
-                return True
-        return False
+                found.add(position)
+        return found
 
     def period_residuals(self, fit: Fit) -> ComplexArray:
         """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""

@@ -1,5 +1,7 @@
 """Shapes refined together with the parameters."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,28 @@ def test_a_shape_at_the_end_of_its_range_does_not_hold_up_the_others(pushed, x, 
             effects[position] = moved(effects[position], shape, step)
             other = bench.fit(effects, start.noise, start=fit.parameters, tangents=False)
             assert other.statistic > fit.statistic - 0.05 - 1e-3 * fit.excess, (shape.name, step)
+
+
+def test_what_runs_away_does_not_hold_up_the_others(rippled, monkeypatch):
+    """Its shape stays where it is, and the others go all the way that they have beside it."""
+    bench, _, now = rippled
+    only, spring = len(bench.effects), make_effect("asymmetric_spring", "knee", exponent=1.5)
+    off = replace(now.fit.effects[-1], order=now.fit.effects[-1].order + 0.2)
+
+    def runs_away(self, before, after):
+        return {only} if after.effects[only] != before.effects[only] else set()
+
+    def refined(only):
+        model = (*now.fit.effects[:-1], spring, off)
+        return bench.refine(model, now.noise, start=now.fit.parameters, only=only)
+
+    free, alone = refined(only), refined(only + 1)
+    assert free.effects[only] != spring
+    monkeypatch.setattr(type(bench), "_run_away", runs_away)
+    held = refined(only)
+    assert held.effects[only] == spring
+    assert held.effects[-1].order == pytest.approx(alone.effects[-1].order, abs=1e-3)
+    assert held.statistic == pytest.approx(alone.statistic, abs=0.05)
 
 
 def test_a_shape_has_the_room_that_is_left_in_its_range():

@@ -80,6 +80,30 @@ def test_what_an_effect_is_worth_does_not_depend_on_what_was_tried_before(labora
     assert apart.freed(None).count > compared == found.bench.freed(None).count
 
 
+def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripple):
+    """And a fit would rule it out as well; what is not far behind is fitted, as if nothing stood beside it."""
+    bench, selection = ripple
+    found, _ = held_out(bench, selection, with_ripple)
+    fit, position = selection.final.fit, len(selection.final.fit.effects) - 1
+    (own,) = found.transfers
+
+    def with_order(order):
+        model = (*fit.effects[:-1], replace(fit.effects[-1], order=order))
+        other = Settled(bench.fit(model, selection.final.noise, start=fit.parameters), selection.final.noise)
+        return replace(selection, final=other)
+
+    wrong, right = with_order(6.0), with_order(fit.effects[-1].order + 1e-3)
+    behind, fitted = found.worth(wrong, position, own), found.worth(wrong, position)
+    assert not behind.holds
+    assert behind != fitted
+    for rival in (behind, fitted):
+        assert rival.statistic - own.statistic > own.margin
+    # about the same in the noise floor of the better one as in its own
+    assert behind.statistic == pytest.approx(fitted.statistic, rel=0.3)
+    assert found.worth(right, position, own) == found.worth(right, position)
+    assert found.worth(right, position, own).holds
+
+
 def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
     """Whatever sensors and friction made of it, and wherever in it the recording begins."""
     again = laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, seed=9)
