@@ -1,8 +1,8 @@
 """The working bench: models made of effects, fitted to one recording in its noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -44,8 +44,11 @@ RUNAWAY = 0.3
 RUNAWAY_STEP = 1.2
 """... by more than this factor with one step of its shape."""
 
+LEAST_GAIN = 0.05
+"""A step of the shapes that takes less than this of the statistic ..."""
+
 STANDS_STILL = 1e-3
-"""A step of the shapes that takes less than this share of the excess was the last."""
+"""... and this share of the excess was the last."""
 
 HOPE = 10.0
 """How many times the gain of the last step all further ones together may bring: steps that shrink by a tenth each."""
@@ -66,11 +69,11 @@ class _Caution:
 
     Attributes:
         level: how careful the last step had to be, in `CAREFUL`.
-        held: positions of effects of which the shapes stay: each would run away.
+        others_stand: whether only what runs away has still a way to go.
     """
 
     level: int = 0
-    held: set[int] = field(default_factory=set)
+    others_stand: bool = False
 
 
 class Bench(ParameterFits):
@@ -134,14 +137,13 @@ class Bench(ParameterFits):
             better = self._refine_step(fit, noise, only, caution)
             if better is None:
                 break
-            gain = fit.statistic - better.statistic
-            fit = better
-            if gain < 0.05 + STANDS_STILL * fit.excess or fit.statistic - HOPE * gain > beat:
+            gain, last, fit = fit.statistic - better.statistic, fit, better
+            if _stands_still(last, fit) or fit.statistic - HOPE * gain > beat:
                 break
         return self.fit(fit.effects, noise, start=fit.parameters, known=known)
 
     def _refine_step(self, fit: Fit, noise: NoiseFloor, only: int, caution: "_Caution") -> Fit | None:
-        shapes = tuple((k, s) for k, s in free_shapes(fit.effects) if k >= only and k not in caution.held)
+        shapes = tuple((k, shape) for k, shape in free_shapes(fit.effects) if k >= only)
         if not shapes:
             return None
         bent = self.tangents(fit.effects, fit.columns, fit.values, shapes)
@@ -150,43 +152,45 @@ class Bench(ParameterFits):
         across = off(fit.basis, directions)  # the samples that are left out are out of them already
         strength = np.linalg.norm(across, axis=0)
         seen = strength > 1e-9
-        if not np.any(seen):
-            return None
         # every shape in its own unit: what one does may be a thousand times what another does
         unit = across[:, seen] / strength[seen]
         normal, gradient = unit.T @ unit, unit.T @ fit.whitened
         rooms = np.array([room(fit.effects[position], shape) for position, shape in shapes]).T[:, seen] * strength[seen]
         follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis.T @ directions)
-        held = np.zeros(len(shapes), dtype=bool)
-        for level in range(max(caution.level - 1, 0), len(CAREFUL)):
+
+        def stepped(level: int, held: Collection[int] = ()) -> Fit | None:
+            """The fit after a step of the shapes of all effects that are not held."""
             needed, part = CAREFUL[level]
-            while True:
-                free = ~held[seen]
-                step, damping = np.zeros(len(strength)), np.diag(RIDGE + needed / strength[seen] ** 2)
-                inner = np.zeros(len(free))
-                inner[free] = _within((normal + damping)[np.ix_(free, free)], gradient[free], rooms[:, free])
-                step[seen] = part * np.clip(inner / strength[seen], -1.0, 1.0)
-                effects = list(fit.effects)
-                for (position, shape), amount in zip(shapes, step, strict=True):
-                    effects[position] = moved(effects[position], shape, float(amount))
-                if tuple(effects) == fit.effects:
-                    return None
-                # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
-                ahead = fit.values + follow @ step
-                start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
-                new = self.fit(effects, noise, start=start, tangents=False, known=fit.known)
-                if not new.statistic < fit.statistic or len(self.slack_links(new)) > len(self.slack_links(fit)):
-                    break
-                away = self._run_away(fit, new)
-                if not away:
-                    caution.level = level
-                    return new
+            free = np.array([position not in held for position, _ in shapes])[seen]
+            inner, step = np.zeros(len(free)), np.zeros(len(shapes))
+            damped = normal + np.diag(RIDGE + needed / strength[seen] ** 2)
+            inner[free] = _within(damped[np.ix_(free, free)], gradient[free], rooms[:, free])
+            step[seen] = part * np.clip(inner / strength[seen], -1.0, 1.0)
+            effects = list(fit.effects)
+            for (position, shape), amount in zip(shapes, step, strict=True):
+                effects[position] = moved(effects[position], shape, float(amount))
+            if tuple(effects) == fit.effects:
+                return None
+            # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
+            ahead = fit.values + follow @ step
+            start = {column.name: float(value) for column, value in zip(fit.columns, ahead, strict=True)}
+            new = self.fit(effects, noise, start=start, tangents=False, known=fit.known)
+            slack = len(self.slack_links(new)) > len(self.slack_links(fit))
+            return new if new.statistic < fit.statistic and not slack else None
+
+        for level in range(max(caution.level - 1, 0), len(CAREFUL)):
+            new = stepped(level)
+            if new is None:
+                continue
+            away = self._run_away(fit, new)
+            if away and not caution.others_stand:
                 # the others have a way of their own, and need not creep along beside it
-                out = np.array([position in away for position, _ in shapes]) & ~held
-                if not np.any(out):
-                    break
-                held |= out
-                caution.held |= away
+                new = stepped(level, away)
+                caution.others_stand = new is None or _stands_still(fit, new) or bool(self._run_away(fit, new))
+                away = away if caution.others_stand else set()
+            if new is not None and not away:
+                caution.level = level
+                return new
         return None
 
     def _run_away(self, before: Fit, after: Fit) -> set[int]:
@@ -237,6 +241,11 @@ class Bench(ParameterFits):
         """(E,) rms of the motor torque of the joint that each equation belongs to [N m]."""
         rms = np.sqrt(np.mean(self.data.tau_motor**2, axis=0))
         return np.asarray(rms[[equation.index for equation in self.data.equations]], dtype=np.float64)
+
+
+def _stands_still(before: Fit, after: Fit) -> bool:
+    """Whether a step of the shapes brought next to nothing."""
+    return before.statistic - after.statistic < LEAST_GAIN + STANDS_STILL * after.excess
 
 
 def _within(normal: FloatArray, gradient: FloatArray, rooms: FloatArray) -> FloatArray:
