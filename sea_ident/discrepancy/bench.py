@@ -134,11 +134,13 @@ class Bench(ParameterFits):
         fit = self.fit(effects, noise, start=start, tangents=False, known=known)
         caution = _Caution()
         for _ in range(rounds):
-            better = self._refine_step(fit, noise, only, caution)
+            stood, last, better = caution.others_stand, fit, self._refine_step(fit, noise, only, caution)
             if better is None:
                 break
-            gain, last, fit = fit.statistic - better.statistic, fit, better
-            if _stands_still(last, fit) or fit.statistic - HOPE * gain > beat:
+            fit = better
+            if caution.others_stand and not stood:
+                continue  # it is the turn of what runs away
+            if _stands_still(last, fit) or fit.statistic - HOPE * (last.statistic - fit.statistic) > beat:
                 break
         return self.fit(fit.effects, noise, start=fit.parameters, known=known)
 
@@ -186,8 +188,8 @@ class Bench(ParameterFits):
             if away and not caution.others_stand:
                 # the others have a way of their own, and need not creep along beside it
                 new = stepped(level, away)
-                caution.others_stand = new is None or _stands_still(fit, new) or bool(self._run_away(fit, new))
-                away = away if caution.others_stand else set()
+                away = set() if new is None else self._run_away(fit, new)
+                caution.others_stand = new is None or bool(away) or _stands_still(fit, new)
             if new is not None and not away:
                 caution.level = level
                 return new
