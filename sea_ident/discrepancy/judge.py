@@ -51,8 +51,8 @@ SMALL_BESIDE = 0.05
 SPRING_LAW = ("spring_stiffness", "spring_stiffening")
 """Parameters of the law of a spring with two equal sides."""
 
-SPEED_LAWS = ("stribeck_friction", "nonlinear_viscous_friction")
-"""Frictions that are a function of nothing but the speed of their motor, ..."""
+ALIKE = (("stribeck_friction", "nonlinear_viscous_friction"), ("torque_ripple",))
+"""Frictions that are a function of nothing but the speed of their motor, and waves over its position, ..."""
 
 OWN_AMOUNT = 7.0
 """... and standard deviations that each must have of its own where there are two of one motor."""
@@ -279,18 +279,20 @@ def brakes(bench: Bench, fit: Fit, position: int) -> bool:
 
 
 def bends_another(bench: Bench, fit: Fit, position: int) -> bool:
-    """Whether a friction only bends the curve of another one over the same speed: its own amount is not known.
+    """Whether an effect only bends the form of another one like it: its own amount is not known.
 
-    Two laws of the library together take the form of any curve. Where the curve is that of neither, they do so by large
-    amounts that nearly cancel, and none is an effect of its own.
+    Two friction laws over the same speed together take the form of any curve, and two waves of nearly the same length
+    that of one that grows and fades. Where what is there has neither form, they do so by large amounts that nearly
+    cancel, and none is an effect of its own.
     """
     position %= len(fit.effects)
     effect = fit.effects[position]
-    laws = [e for e in fit.effects if e.name in SPEED_LAWS and e.joint == effect.joint]
-    if effect.name not in SPEED_LAWS or len(laws) < 2:
+    family = next((names for names in ALIKE if effect.name in names), ())
+    if sum(e.name in family and e.joint == effect.joint for e in fit.effects) < 2:
         return False
-    start = sum(bench.counts(fit.effects)[:position])
-    return abs(float(fit.values[start])) < OWN_AMOUNT * fit.std(start)
+    own = _own(bench, fit, position)
+    factor, values = fit.covariance_factor[own], fit.values[own]
+    return bool(values @ np.linalg.lstsq(factor @ factor.T, values, rcond=None)[0] < OWN_AMOUNT**2)
 
 
 def physical(bench: Bench, fit: Fit, position: int) -> bool:

@@ -177,6 +177,21 @@ def test_of_two_frictions_over_one_speed_none_without_an_amount_is_its_own(nothi
     assert bent(viscous, make_effect("torque_offset", "knee")) == [False, False]
 
 
+@pytest.mark.parametrize(("orders", "bends"), [((20.0, 20.4), True), ((5.0, 20.0), False)])
+def test_of_two_waves_of_nearly_the_same_length_none_is_its_own(laboratory, orders, bends):
+    """A wave that grows and fades along the way is no sum of two that are there all the way."""
+    amount = [[1.0, 0.0], [-0.95, 0.0]]
+    planted = [("torque_ripple", "hip", own, {"order": order}) for own, order in zip(amount, orders, strict=True)]
+    bench = laboratory.bench(laboratory.record(planted))
+    start = settle(bench, bench.effects)
+    waves = [replace(make_effect("torque_ripple", "hip", order=o), number=k + 1) for k, o in enumerate(orders)]
+    model = (*start.fit.effects, *waves)
+    fit = bench.refine(model, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    assert [bends_another(bench, fit, k) for k in (-2, -1)] == [bends, bends]
+    alone = bench.fit((*start.fit.effects, waves[0]), start.noise, start=start.fit.parameters)
+    assert not bends_another(bench, alone, -1)
+
+
 @pytest.mark.scenario
 def test_two_frictions_that_are_there_have_their_amounts(laboratory):
     laws = [("stribeck_friction", "knee", [5.0], {"speed": 0.1}), ("nonlinear_viscous_friction", "knee", [9.0], {})]
