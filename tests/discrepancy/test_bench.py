@@ -60,6 +60,29 @@ def test_what_runs_away_does_not_hold_up_the_others(rippled, monkeypatch):
     assert held.statistic < alone.statistic + 0.1 + 2e-3 * alone.excess
 
 
+@pytest.mark.parametrize(("begun", "planted"), [(1.4, 0.7), (0.7, 1.5)])
+def test_a_power_of_the_speed_passes_one_on_its_way(laboratory, monkeypatch, begun, planted):
+    """Near one it does what viscous friction does, at any size: from both sides it ends where it was planted."""
+    law = "nonlinear_viscous_friction"
+    bench = laboratory.bench(laboratory.record([(law, "knee", [9.0], {"exponent": planted})]))
+    start, steps, step = settle(bench, bench.effects), [], type(bench)._refine_step
+
+    def counted(self, *args):
+        steps.append(args)
+        return step(self, *args)
+
+    monkeypatch.setattr(type(bench), "_refine_step", counted)
+    model = (*start.fit.effects, make_effect(law, "knee", exponent=begun))
+    fit = bench.refine(model, start.noise, start=start.fit.parameters)
+    number, (_, exponent) = next((k, f) for k, f in enumerate(fit.free_shapes) if f[0] == len(model) - 1)
+    std = fit.std(len(fit.columns) + number) * (exponent.upper - exponent.lower)
+    assert fit.effects[-1].exponent == pytest.approx(planted, abs=4.0 * std)
+    assert std < 0.2
+    amount = next(k for k, column in enumerate(fit.columns) if column.name == f"knee.{law}")
+    assert fit.values[amount] == pytest.approx(9.0, abs=4.0 * fit.std(amount))
+    assert len(steps) < 12
+
+
 def test_a_shape_has_the_room_that_is_left_in_its_range():
     play = make_effect("backlash", "knee", half_width=0.01)
     width = next(shape for shape in play.shapes if shape.name == "half_width")
