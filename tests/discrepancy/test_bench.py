@@ -60,6 +60,7 @@ def test_what_runs_away_does_not_hold_up_the_others(rippled, monkeypatch):
     assert held.statistic < alone.statistic + 0.1 + 2e-3 * alone.excess
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("begun", "planted"), [(1.4, 0.7), (0.7, 1.5)])
 def test_a_power_of_the_speed_passes_one_on_its_way(laboratory, monkeypatch, begun, planted):
     """Near one it does what viscous friction does, at any size: from both sides it ends where it was planted."""

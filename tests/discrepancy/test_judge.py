@@ -177,6 +177,7 @@ def test_of_two_frictions_over_one_speed_none_without_an_amount_is_its_own(nothi
     assert bent(viscous, make_effect("torque_offset", "knee")) == [False, False]
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("orders", "bends"), [((20.0, 20.4), True), ((5.0, 20.0), False)])
 def test_of_two_waves_of_nearly_the_same_length_none_is_its_own(laboratory, orders, bends):
     """A wave that grows and fades along the way is no sum of two that are there all the way."""
