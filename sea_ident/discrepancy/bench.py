@@ -155,6 +155,8 @@ class Bench(ParameterFits):
         across = off(fit.basis, directions)  # the samples that are left out are out of them already
         strength = np.linalg.norm(across, axis=0)
         seen = strength > 1e-9
+        if not np.any(seen):
+            return None
         # every shape in its own unit: what one does may be a thousand times what another does
         unit = across[:, seen] / strength[seen]
         normal, gradient = unit.T @ unit, unit.T @ fit.whitened

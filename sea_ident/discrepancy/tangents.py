@@ -41,7 +41,7 @@ class Tangents(Columns):
     def __init__(self, data: PeriodData, evaluated: Evaluated | None = None) -> None:
         super().__init__(data, evaluated)
         self._stiffness: tuple[Fit, FloatArray] | None = None
-        self._derivatives: tuple[object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
+        self._derivatives: tuple[State, object, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
     def stiffness_slopes(
         self, columns: Sequence[Column], design: ComplexArray, effects: Sequence[Effect]
@@ -249,9 +249,9 @@ class Tangents(Columns):
         robot = self.robot
         inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
         rotors = np.array([parameters.get(f"{rotor.rotor_group}.rotor_inertia", 0.0) for rotor in robot.rotors])
-        key = (tuple(inertial), tuple(rotors), id(state))
-        if self._derivatives is not None and self._derivatives[0] == key:
-            return self._derivatives[1]
+        key = tuple(inertial), tuple(rotors)
+        if self._derivatives is not None and self._derivatives[0] is state and self._derivatives[1] == key:
+            return self._derivatives[2]
         bodies = inertial.reshape(-1, 10)
         moments = np.linalg.norm(bodies[:, 1:4], axis=1)
         if np.all(rotors > 0.0) and np.all(np.abs(bodies[:, 0]) > moments / LONGEST_LEVER):
@@ -283,8 +283,8 @@ class Tangents(Columns):
             parts[2] = upper + np.triu(upper, 1).transpose(0, 2, 1)
             out.append(parts)
         change = out[0] if len(out) == 1 else out[0] - out[1]
-        self._derivatives = (key, (change[0], change[1], change[2]))
-        return self._derivatives[1]
+        self._derivatives = state, key, (change[0], change[1], change[2])
+        return self._derivatives[2]
 
 
 def _slope(torque: ComplexArray, deflection: ComplexArray) -> FloatArray:
