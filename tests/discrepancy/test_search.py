@@ -47,6 +47,20 @@ def test_two_processes_find_what_one_does(unequal, monkeypatch):
     assert [(c.key, c.gain) for c in both.candidates] == [(c.key, c.gain) for c in alone.candidates]
 
 
+@pytest.mark.parametrize(("far", "tried"), [(np.inf, [1, 2]), (0.0, [2])])
+def test_far_from_right_nothing_gives_way_before_all_is_added(unequal, monkeypatch, far, tried):
+    """But then it does: what was added first may be the wrong one."""
+    bench, found = unequal
+    calls = []
+    monkeypatch.setattr("sea_ident.discrepancy.search.FAR_FROM_RIGHT", far)
+    monkeypatch.setattr(
+        "sea_ident.discrepancy.search.exchange", lambda bench, now, added, *_: (calls.append(added), now)[1]
+    )
+    again = search(Bench(bench.data, bench.effects), bench.effects)
+    assert calls == tried
+    assert named(again) == named(found)
+
+
 def test_a_small_effect_at_another_joint_is_found_beside_a_large_one(unequal):
     found = unequal[1]
     assert named(found) == {("torque_offset", "knee"), ("stribeck_friction", "hip")}
