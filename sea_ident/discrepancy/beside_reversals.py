@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import candidate_effects, scan
+from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, SMALLEST_SHARE, next_effect
 from sea_ident.discrepancy.search import MOST_EFFECTS
 from sea_ident.discrepancy.settle import Settled, settle_again

@@ -1,4 +1,4 @@
-"""Candidates: every effect of the library at every place that the model does not have yet."""
+"""Candidates: how far every effect that a model does not have yet would bring the statistic down."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,16 +13,13 @@ from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import nearly
 from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.effects import Effect, JointEffect, Side, effect_classes
-from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects import Effect, JointEffect, Side
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import EffectError
-
-ONLY_AGAINST_REFERENCE = ("payload",)
-"""Effects that a fit of all parameters absorbs altogether."""
 
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
@@ -51,7 +48,6 @@ EXACTLY = 1e-9
 
 ABSORBED = 1e-8
 """A column of which the model leaves less than this share of its power is absorbed."""
-
 
 ELSEWHERE = 0.05
 """Share of what is to be explained that must be in the equations of an effect for it to be looked at: what a refit of
@@ -95,38 +91,6 @@ class Candidate:
         """Share of its power that the model absorbs [-]."""
         total = float(self.raw_power.sum())
         return 1.0 - float(np.sum(self.directions**2)) / total if total > 0.0 else 1.0
-
-
-def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Every effect of the library at every place that the model does not have yet, and that shows in the mean."""
-    present = {effect_key(effect) for effect in effects}
-    present_columns = {column.name for column in bench.labels(effects)}
-    found = []
-    for name, kind in sorted(effect_classes().items()):
-        if name in ONLY_AGAINST_REFERENCE or issubclass(kind, TrendEffect):
-            continue
-        for place in kind.instances(bench.robot):
-            effect = _absent(bench, place, effect_key(place) in present, present_columns)
-            if effect is not None:
-                found.append(effect)
-    return tuple(found)
-
-
-def _absent(bench: Bench, place: Effect, taken: bool, present_columns: set[str]) -> Effect | None:
-    """The effect, or where its place is taken the form of it that can stand beside what is there; None where none can.
-
-    Args:
-        bench: the recording.
-        place: the effect.
-        taken: whether the model has it in one form or other.
-        present_columns: names of the parameters of the model.
-    """
-    effect: Effect | None = place
-    if taken and place.beside() is None:
-        return None
-    while effect is not None and {column.name for column in effect.columns(bench.robot)} & present_columns:
-        effect = effect.beside()
-    return effect
 
 
 def scan(

@@ -16,7 +16,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import assess, circular
 from sea_ident.discrepancy.base_model import completed
-from sea_ident.discrepancy.candidates import Candidate, candidate_effects, scan
+from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
@@ -30,6 +30,7 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
+from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model

@@ -7,9 +7,10 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from sea_ident.discrepancy import candidates, periods
-from sea_ident.discrepancy.candidates import EXACTLY, FEW_SHAPES, _best_last, candidate_effects, scan
+from sea_ident.discrepancy.candidates import EXACTLY, FEW_SHAPES, _best_last, scan
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import Side, make_effect
 from sea_ident.motion import FourierSeries
@@ -124,18 +125,6 @@ def test_play_that_is_never_closed_does_what_an_offset_does(laboratory):
     gains = {c.effect.name: c.gain for c in scan(bench, now.fit, now.noise, effects)}
     assert gains["spring_offset"] > 100.0
     assert gains["backlash"] == pytest.approx(gains["spring_offset"], rel=0.02)
-
-
-def test_beside_a_ripple_another_is_tried_until_there_are_enough(nothing_missing):
-    bench, _ = nothing_missing
-
-    def tried(*numbers):
-        there = [make_effect("torque_ripple", "hip", order=4.0 * number, number=number) for number in numbers]
-        found = candidate_effects(bench, (*bench.effects, *there))
-        assert [e.number for e in found if e.name == "torque_ripple" and e.joint == "knee"] == [1]
-        return [e.number for e in found if e.name == "torque_ripple" and e.joint == "hip"]
-
-    assert [tried(), tried(1), tried(1, 2), tried(2), tried(1, 2, 3)] == [[1], [2], [3], [1], []]
 
 
 @pytest.mark.parametrize("rounding", [-1e-12, 0.0, 1e-12])
