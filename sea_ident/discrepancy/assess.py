@@ -16,6 +16,7 @@ from sea_ident.discrepancy.judge import (
     EQUALLY_GOOD,
     FEWEST_TO_SEARCH,
     flat_steps,
+    never_closed,
     penalty,
     physical,
     slowest,
@@ -80,7 +81,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             explained = reduced.whitened - fit.whitened
             share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
             other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
-            if new.statistic - fit.statistic + price < enough:
+            # a play that is never closed is a constant: nothing but its size is fitted
+            if new.statistic - fit.statistic + price < enough or never_closed(bench, new.effects, position):
                 alike.append(other)
                 scores.append(new.statistic)
             else:

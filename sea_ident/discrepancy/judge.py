@@ -1,5 +1,6 @@
 """What speaks for an effect in a fit, and what against it."""
 
+from collections.abc import Sequence
 from typing import TypeGuard
 
 import numpy as np
@@ -15,6 +16,7 @@ from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
+from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
@@ -207,6 +209,16 @@ def penalty(effect: Effect, bench: Bench) -> float:
 def slowest(effect: Effect) -> bool:
     """Whether a wave along a path ended as the longest that there is: then it only stands in for a constant."""
     return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.shapes)
+
+
+def never_closed(bench: Bench, effects: Sequence[Effect], position: int) -> bool:
+    """Whether a motion keeps a play open to one side: its torque is then a constant, whatever its width and its ends."""
+    play = effects[position]
+    if not isinstance(play, Backlash):
+        return False
+    deflection = bench.state(effects).motion.deflection[:, bench.robot.index(play.required_joint)]
+    one_side = bool(np.all(deflection > 0.0) or np.all(deflection < 0.0))
+    return one_side and float(np.min(np.abs(deflection))) > (1.0 + play.softness) * play.half_width
 
 
 def dissipates(bench: Bench, effect: Effect, values: FloatArray) -> bool:

@@ -63,6 +63,25 @@ def test_a_kink_never_passed_is_declared_beside_an_offset_and_play_before_a_stif
     assert not {"backlash", "asymmetric_spring"} & knee
 
 
+@pytest.mark.scenario
+@pytest.mark.parametrize(
+    "planted",
+    [("spring_offset", "hip", [-1.2], {}), ("backlash", "hip", [600.0], {"half_width": 0.002, "softness": 0.05})],
+    ids=lambda planted: planted[0],
+)
+def test_play_that_a_nearly_straight_spring_never_closes_is_an_offset_and_declared_beside_it(laboratory, planted):
+    nearly_straight = ("spring_stiffening", "hip", [-13000.0], {"exponent": 3.0})
+    bench = laboratory.bench(laboratory.record([planted, nearly_straight], periods=8, settling=Settling()))
+    start = settle(bench, bench.effects)
+    effects = (*start.fit.effects, make_effect("spring_offset", "hip"))
+    final = settle_again(bench, bench.fit(effects, start.noise, start=start.fit.parameters))
+    assert final.fit.statistic < 1.2 * final.fit.dof
+    found = declared(rivals(bench, Selection(start, final, 1, (1e-9,))))[len(start.fit.effects)]
+    play = next(a for a in found if a.effect == "backlash" and a.joint == "hip")
+    width, amount = play.fit.effects[-1].half_width, play.fit.parameters["hip.backlash"]
+    assert width * amount == pytest.approx(1.2, rel=0.1)
+
+
 def test_what_is_shorter_than_is_compared_is_no_rival(preloaded, monkeypatch):
     """As a push that never pauses, which is a constant by the name of a push."""
     bench, _, selection = preloaded
