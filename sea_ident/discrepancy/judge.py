@@ -212,7 +212,7 @@ def slowest(effect: Effect) -> bool:
 
 
 def never_closed(bench: Bench, effects: Sequence[Effect], position: int) -> bool:
-    """Whether a motion keeps a play open to one side: its torque is then a constant, whatever its width and its ends."""
+    """Whether a motion keeps a play open to one side: its torque is a constant then, whatever its width and ends."""
     play = effects[position]
     if not isinstance(play, Backlash):
         return False
