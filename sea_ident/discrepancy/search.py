@@ -122,12 +122,12 @@ def search(
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
         largest = _largest_changes(bench, now.fit, len(added))
-    waits = False
+    waits, before = False, now
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
         step = None
-        if len(added) < MOST_EFFECTS:
+        if len(added) < MOST_EFFECTS and not _lost(now, before, len(added), candidates):
             smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
             step = next_effect(bench, now, candidates, tests, smallest, tried)
         if step is None and waits:
@@ -140,26 +140,27 @@ def search(
         new, p_value = step
         largest = np.maximum(largest, visible_changes(bench, now.fit, new))
         added.append(p_value)
-        last = now
+        before = now
         now = _settled(bench, settle_again(bench, new))
-        waits = now.fit.statistic > FAR_FROM_RIGHT * now.fit.dof
-        waits = waits and not _lost(now, last, len(added)) and _possible(bench, now, len(added))
+        waits = now.fit.statistic > FAR_FROM_RIGHT * now.fit.dof and _possible(bench, now, len(added))
         now = _formed(bench, now) if waits else _improved(bench, now, len(added), tried, ruled_out)
-        if _lost(now, last, len(added)):
-            break
         if not _possible(bench, now, len(added)):
             added.pop()
-            now = last
+            now = before
             break
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
     now, added = _eliminate(bench, now, added, tests)
     return replace(whole, final=now, added=len(added), p_values=tuple(added), whole=whole)
 
 
-def _lost(now: Settled, last: Settled, added: int) -> bool:
-    """Whether a second or later effect left so much, that the library does not have what is missing."""
+def _lost(now: Settled, before: Settled, added: int, candidates: Sequence[Candidate]) -> bool:
+    """Whether a second or later effect left so much, that the library does not have what is missing.
+
+    Two effects that matter alike leave half each: then another one promises the rest.
+    """
     far = added > 1 and now.fit.statistic > HOPELESS * now.fit.dof
-    return far and now.fit.excess > SLOW * last.fit.excess
+    most = max((candidate.gain for candidate in candidates), default=0.0)
+    return far and now.fit.excess > SLOW * before.fit.excess and most < (1.0 - SLOW) * now.fit.excess
 
 
 def _possible(bench: Bench, now: Settled, added: int) -> bool:

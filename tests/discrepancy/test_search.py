@@ -1,6 +1,7 @@
 """What the search adds to a model: small effects beside large ones, and the simpler of two that say the same."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, visible_changes
-from sea_ident.discrepancy.search import Selection, _eliminate, search, still_needed
+from sea_ident.discrepancy.search import Selection, _eliminate, _lost, search, still_needed
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 
@@ -277,3 +278,27 @@ def test_what_is_not_physical_in_the_end_is_not_found(rippled):
     assert [e.name for e in left.fit.effects[-1:]] == ["torque_ripple"]
     assert len(p_values) == 1
     assert _eliminate(bench, Settled(replace(with_it, values=bent), right.noise), [1e-9], 1000)[1] == []
+
+
+@pytest.mark.scenario
+def test_what_leaves_half_is_not_lost_where_another_promises_the_rest(laboratory, monkeypatch):
+    monkeypatch.setattr("sea_ident.discrepancy.search.HOPELESS", 20.0)
+    planted = [("torque_offset", name, [size], {}) for name, size in (("hip", 4.0), ("knee", -2.0), ("ankle", 1.4))]
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    assert named(search(bench, bench.effects)) == {(name, joint) for name, joint, *_ in planted}
+
+
+@pytest.mark.parametrize(
+    ("added", "statistic", "promised", "lost"),
+    [
+        (2, 6e4, 2e4, True),
+        (2, 6e4, 4e4, False),  # another one promises most of what is left
+        (2, 3e4, 1e4, False),  # it took most of what was there
+        (1, 6e4, 2e4, False),  # the first of many
+        (2, 5e2, 2e2, False),  # little is left
+    ],
+)
+def test_a_search_is_lost_far_from_right_where_nothing_takes_most_of_what_is_left(added, statistic, promised, lost):
+    before, now = (SimpleNamespace(fit=SimpleNamespace(statistic=s, dof=100, excess=s - 100)) for s in (1e5, statistic))
+    candidates = [SimpleNamespace(gain=promised), SimpleNamespace(gain=0.0)]
+    assert _lost(now, before, added, candidates) == lost
