@@ -9,6 +9,8 @@ parameters that its own cause could not have:
 - Friction of a link that is viscous alone, without any dry friction of the bearings and seals that it is in, is what an
   encoder does that is late. A damper fits; where something is left, it is none.
 - A parallel spring without stiffness is a constant torque.
+- A play that is closed and whose spring is not the one that it is in carries torque where it should carry none: that is
+  a spring with another law.
 """
 
 from dataclasses import dataclass
@@ -17,15 +19,22 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import slowest
+from sea_ident.discrepancy.judge import never_closed, slowest
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.parallel_spring import ParallelSpring
 
 NO_DRY_FRICTION = 0.01
 """Share of the power of a friction up to which it has no dry part [-]: a tenth of its torque."""
+
+ANOTHER = 0.25
+"""Share of the stiffness of a spring by which that of a play in it may differ, as other effects bend the two [-], ..."""
+
+CERTAIN = 5.0
+"""... and standard deviations of the difference."""
 
 NOTHING = 3.0
 """Standard deviations within which a parameter is nothing."""
@@ -61,6 +70,8 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
             words = "as less than a wave in a turn of the joint, and nothing in it turns so slowly"
         elif isinstance(effect, LinkFriction) and not fits and _is_viscous(bench, fit, position):
             words = "as viscous alone, as if its encoder were late, and leaves more than noise"
+        elif isinstance(effect, Backlash) and not never_closed(bench, fit.effects, position):
+            words = _in_another_spring(bench, fit, position, effect)
         if words:
             found.append(StandIn(effect.name, effect.joint, words, 1.0, fit.solution))
     return tuple(found)
@@ -70,6 +81,21 @@ def _is_nothing(bench: Bench, fit: Fit, position: int) -> bool:
     """Whether the first parameter of an effect is zero within its standard deviation."""
     index = sum(bench.counts(fit.effects)[:position])
     return bool(abs(fit.values[index]) < NOTHING * fit.std(index))
+
+
+def _in_another_spring(bench: Bench, fit: Fit, position: int, play: Backlash) -> str:
+    """The stiffness of a play where it is not that of the spring that it is in, in words."""
+    names = [column.name for column in fit.columns]
+    spring = f"{play.joint}.spring_stiffness"
+    if spring not in names:
+        return ""
+    own, whole = sum(bench.counts(fit.effects)[:position]), names.index(spring)
+    taken, stiffness = float(fit.values[own]), float(fit.values[whole])
+    std = float(np.linalg.norm(fit.covariance_factor[own] - fit.covariance_factor[whole]))
+    if abs(taken - stiffness) < max(ANOTHER * stiffness, CERTAIN * std):
+        return ""
+    unit = fit.columns[own].unit
+    return f"in a spring of {stiffness:.4g} {unit} of which it takes up {taken:.4g} {unit}, not all as a play does"
 
 
 def _is_viscous(bench: Bench, fit: Fit, position: int) -> bool:

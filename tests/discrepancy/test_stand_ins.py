@@ -83,3 +83,14 @@ def test_a_parallel_spring_without_stiffness_is_none(laboratory, stiffness, said
     there = stand_ins(bench, found(bench, make_effect("parallel_spring", "knee")))
     assert len(there) == said
     assert all("without any stiffness" in one.sentence for one in there)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("taken", "said"), [(200.0, 0), (110.0, 1)])
+def test_a_spring_that_is_softer_in_its_middle_has_no_play(laboratory, taken, said):
+    """Play takes up all of its spring, of 200 N m/rad, not a part."""
+    shape = {"half_width": 0.005, "softness": 0.05, "cubic": 40.0 if said == 0 else 0.0}
+    bench = laboratory.bench(laboratory.record([("backlash", "knee", (taken,), shape)]))
+    there = stand_ins(bench, found(bench, make_effect("backlash", "knee", half_width=0.004)))
+    assert len(there) == said
+    assert all("not all as a play does" in one.sentence for one in there)
