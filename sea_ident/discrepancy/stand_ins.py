@@ -31,7 +31,7 @@ NO_DRY_FRICTION = 0.01
 """Share of the power of a friction up to which it has no dry part [-]: a tenth of its torque."""
 
 ANOTHER = 0.25
-"""Share of the stiffness of a spring by which that of a play in it may differ, as other effects bend the two [-], ..."""
+"""Share of the stiffness of a spring by which that of a play in it may differ: other effects bend the two [-], ..."""
 
 CERTAIN = 5.0
 """... and standard deviations of the difference."""

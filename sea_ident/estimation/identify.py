@@ -20,6 +20,7 @@ from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.repeated_steps import repeated_steps
+from sea_ident.estimation.scales import other_scale
 from sea_ident.estimation.separability import unseparated_friction
 from sea_ident.estimation.signs import check_signs
 from sea_ident.estimation.solve import condition_number, solve_weighted
@@ -181,6 +182,7 @@ def _doubts(model: Model) -> list[str]:
         for s in model.springs
         if s.stiffness < -5.0 * s.stiffness_std
     )
+    found.extend(other_scale(model.robot, model.springs))
     return found
 
 
