@@ -108,7 +108,7 @@ def _in_its_spring(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, bea
     for _ in range(MOST_LAWS):
         anchored = list(fit.effects)
         own = bench.anchored(fit.effects, fit.parameters)[position]
-        anchored[position] = _never_closed(bench, own, fit) if isinstance(own, Backlash) else own
+        anchored[position] = _as_wide_as_in_its_spring(bench, own, fit) if isinstance(own, Backlash) else own
         if tuple(anchored) == fit.effects:
             break
         last, fit = fit, bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects), beat=beat)
@@ -145,7 +145,7 @@ def _softened(
     return best
 
 
-def _never_closed(bench: Bench, play: Backlash, fit: Fit) -> Backlash:
+def _as_wide_as_in_its_spring(bench: Bench, play: Backlash, fit: Fit) -> Backlash:
     """Play that the motion never closes as wide as makes it one in the spring that it is in.
 
     Its torque is then about a constant, K times the width. A fit of both ends wherever it passes on that way, at worst
@@ -186,7 +186,7 @@ def _open(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
         new = bench.fit(effects, noise, start=fit.parameters)
         if _in_series(new, tried) and new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit:
             return new
-        last, tried = tried, _never_closed(bench, tried, new)
+        last, tried = tried, _as_wide_as_in_its_spring(bench, tried, new)
         if tried == last:
             break
     return fit

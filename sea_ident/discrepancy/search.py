@@ -122,7 +122,7 @@ def search(
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
         largest = _largest_changes(bench, now.fit, len(added))
-    waits, before = False, now
+    waits, before = False, start
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)

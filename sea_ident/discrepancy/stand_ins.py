@@ -95,7 +95,9 @@ def _in_another_spring(bench: Bench, fit: Fit, position: int, play: Backlash) ->
     if abs(taken - stiffness) < max(ANOTHER * stiffness, CERTAIN * std):
         return ""
     unit = fit.columns[own].unit
-    return f"in a spring of {stiffness:.4g} {unit} of which it takes up {taken:.4g} {unit}, not all as a play does"
+    return (
+        f"in a spring of {stiffness:.4g} {unit} with {taken:.4g} {unit}, where a play takes up just what its spring has"
+    )
 
 
 def _is_viscous(bench: Bench, fit: Fit, position: int) -> bool:

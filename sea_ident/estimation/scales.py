@@ -40,5 +40,5 @@ def other_scale(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
         why = "has tau_motor or current another unit, or is a gear ratio, torque constant or stiffness described wrong"
     return [
         f"no spring has the stiffness that is described ({'; '.join(text for _, text in found)}): {why}. "
-        "Bodies and friction are wrong by as much"
+        "Where it is the torque, bodies and friction are wrong by as much"
     ]

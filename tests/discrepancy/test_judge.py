@@ -15,6 +15,7 @@ from sea_ident.discrepancy.judge import (
     bends_another,
     comes_first,
     dissipates,
+    never_closed,
     physical,
     possible,
     pushes_back,
@@ -233,3 +234,24 @@ def test_a_small_part_of_the_wrong_sign_is_excused_while_others_are_missing(labo
         assert not physical(bench, bent, -1)
         assert possible(bench, bent, start.noise, -1) is accepted
     assert possible(bench, fit, start.noise, -1)
+
+
+@pytest.mark.parametrize(
+    ("joint", "share", "softness", "open_to_one_side"),
+    [
+        ("hip", 0.9, 0.05, True),
+        ("hip", 1.1, 0.05, False),
+        ("hip", 0.9, 0.5, False),  # its soft end is met
+        ("knee", 0.5, 0.05, False),  # to one side, then to the other: no constant, however narrow
+    ],
+)
+def test_play_is_never_closed_where_the_motion_stays_beyond_one_of_its_ends(
+    nothing_missing, joint, share, softness, open_to_one_side
+):
+    bench, start = nothing_missing
+    deflection = bench.data.motion.deflection[:, bench.robot.index(joint)]
+    assert bool(np.ptp(np.sign(deflection))) == (joint == "knee")
+    play = make_effect("backlash", joint, half_width=share * float(np.min(np.abs(deflection))), softness=softness)
+    effects = (*start.fit.effects, play)
+    assert never_closed(bench, effects, -1) == open_to_one_side
+    assert not never_closed(bench, effects, 0)

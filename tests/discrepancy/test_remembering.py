@@ -70,7 +70,6 @@ def test_a_library_without_dry_friction_in_springs_names_none(laboratory, offset
 
 
 @pytest.mark.scenario
-@pytest.mark.scenario
 @pytest.mark.parametrize("amounts", [[1.0, 3.0], [2.0, 1.0]])
 def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laboratory, amounts):
     """The constant is the same on both, and what tells is left on the other motion while it slips."""

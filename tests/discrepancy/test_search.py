@@ -288,6 +288,21 @@ def test_what_leaves_half_is_not_lost_where_another_promises_the_rest(laboratory
     assert named(search(bench, bench.effects)) == {(name, joint) for name, joint, *_ in planted}
 
 
+@pytest.mark.scenario
+def test_what_another_search_found_is_no_step_of_this_one(laboratory, monkeypatch):
+    """Two that matter alike are left beside that, none of which promises most of what is left: there it begins."""
+    planted = [("torque_offset", name, [size], {}) for name, size in (("hip", 4.0), ("knee", -2.0), ("ankle", 1.4))]
+    planted.append(("parallel_spring", "knee", [1.5, 0.2], {}))
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    start = settle(bench, bench.effects)
+    two = (*start.fit.effects, *(make_effect("torque_offset", name) for name in ("hip", "knee")))
+    begun = Selection(
+        start, settle_again(bench, bench.fit(two, start.noise, start=start.fit.parameters)), 2, (0.0, 0.0)
+    )
+    monkeypatch.setattr("sea_ident.discrepancy.search.HOPELESS", 20.0)
+    assert named(search(bench, bench.effects, begun)) == {(name, joint) for name, joint, *_ in planted}
+
+
 @pytest.mark.parametrize(
     ("added", "statistic", "promised", "lost"),
     [

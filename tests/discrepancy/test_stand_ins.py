@@ -11,7 +11,7 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.judge import slowest
 from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.effects import Effect, make_effect
 
@@ -88,9 +88,24 @@ def test_a_parallel_spring_without_stiffness_is_none(laboratory, stiffness, said
 @pytest.mark.scenario
 @pytest.mark.parametrize(("taken", "said"), [(200.0, 0), (110.0, 1)])
 def test_a_spring_that_is_softer_in_its_middle_has_no_play(laboratory, taken, said):
-    """Play takes up all of its spring, of 200 N m/rad, not a part."""
+    """Play takes up just what its spring has, 200 N m/rad."""
     shape = {"half_width": 0.005, "softness": 0.05, "cubic": 40.0 if said == 0 else 0.0}
     bench = laboratory.bench(laboratory.record([("backlash", "knee", (taken,), shape)]))
     there = stand_ins(bench, found(bench, make_effect("backlash", "knee", half_width=0.004)))
     assert len(there) == said
-    assert all("not all as a play does" in one.sentence for one in there)
+    assert all("takes up just what its spring has" in one.sentence for one in there)
+
+
+def test_play_that_is_never_closed_is_in_any_spring(laboratory, nothing_missing):
+    """Then only its stiffness times its width shows, and half the width makes it twice as stiff."""
+    bench, start = nothing_missing
+    least = float(np.min(np.abs(bench.data.motion.deflection[:, 0])))
+    play = make_effect("backlash", "hip", half_width=0.5 * least)
+    fit = bench.fit((*start.fit.effects, play), start.noise, start=start.fit.parameters)
+    values = fit.values.copy()
+    values[-1] = 2.0 * fit.parameters["hip.spring_stiffness"]
+    for width, said in ((0.5 * least, 0), (1.5 * least, 1)):
+        effects = (*fit.effects[:-1], replace(play, half_width=width))
+        held = replace(fit, effects=effects, values=values)
+        there = stand_ins(bench, Selection(start, Settled(held, start.noise), 1, (0.0,)))
+        assert len(there) == said
