@@ -61,6 +61,9 @@ class Breakaway:
 def stiction(bench: Bench, fit: Fit, position: int, noise: NoiseFloor) -> Breakaway | None:
     """By how much an effect of a model lets its motor go late, None where that is nothing that the passes show.
 
+    A friction that still falls at speeds at which it slides has that in its law already: late is what lets go above
+    the law, too.
+
     Args:
         bench: the recording.
         fit: the model with the effect.
@@ -69,6 +72,8 @@ def stiction(bench: Bench, fit: Fit, position: int, noise: NoiseFloor) -> Breaka
     """
     effect = fit.effects[position]
     if not isinstance(effect, StribeckFriction):
+        return None
+    if not lets_go_late(bench, fit, effect):
         return None
     others = [e for k, e in enumerate(fit.effects) if k != position]
     rest = bench.fit(others, noise, start=fit.parameters, tangents=False)

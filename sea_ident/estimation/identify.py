@@ -180,8 +180,9 @@ def _doubts(model: Model) -> list[str]:
         "(unknown_zero, on the command line --unknown-zero), has one of them the wrong sign, or does the model lack "
         "friction of the link (effect link_friction)?"
         for s in model.springs
-        if s.stiffness < -5.0 * s.stiffness_std
+        if s.stiffness < -5.0 * s.stiffness_noise_std
     )
+    found.extend(text for text in (spring.doubt() for spring in model.springs) if text is not None)
     found.extend(other_scale(model.robot, model.springs))
     return found
 

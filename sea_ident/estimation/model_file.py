@@ -292,6 +292,8 @@ def _spring_to_dict(spring: SpringResult) -> dict[str, Any]:
         "rms_torque": spring.rms_torque,
         "largest_deflection": spring.largest_deflection,
         "held_out": spring.held_out,
+        "noise": spring.noise,
+        "misfit": [list(row) for row in spring.misfit],
     }
 
 
@@ -316,6 +318,8 @@ def _spring_from_dict(entry: Mapping[str, Any], robot: Robot) -> SpringResult:
         degrees_of_freedom=math.inf if freedom is None else float(freedom),
         terms=terms,
         full_covariance=tuple(tuple(row) for row in whole),
+        noise=None if entry.get("noise") is None else float(entry["noise"]),
+        misfit=tuple(tuple(float(v) for v in row) for row in entry.get("misfit", ())),
     )
 
 

@@ -244,6 +244,8 @@ def _result(first: Model, values: FloatArray, influences: FloatArray, inverse: F
 
 
 def _spring(spring: SpringResult, law: FloatArray, covariance: FloatArray, freedom: float) -> SpringResult:
+    if spring.misfit:
+        covariance = covariance + np.array(spring.misfit)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return replace(
         spring,

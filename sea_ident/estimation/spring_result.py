@@ -60,6 +60,10 @@ class SpringResult:
         note: reason of the verdict, in words.
         terms: further effects in the spring, fitted together with the law.
         full_covariance: (3 + k, 3 + k) of K1, K3, D and the values of all terms; empty without terms.
+        noise: rms of the noise of the mean spring torque less the law, by the scatter of the periods; None without
+            periods [N m] or [N].
+        misfit: (3, 3) part of `covariance` that counts what the law leaves beyond its noise as random; empty where it
+            leaves no more than noise.
     """
 
     joint: str
@@ -82,6 +86,8 @@ class SpringResult:
     note: str
     terms: tuple[SpringTerm, ...] = ()
     full_covariance: tuple[tuple[float, ...], ...] = ()
+    noise: float | None = None
+    misfit: tuple[tuple[float, ...], ...] = ()
 
     @property
     def law(self) -> tuple[float, float, float]:
@@ -92,6 +98,12 @@ class SpringResult:
         if self.verdict is Verdict.LINEAR and not self.terms:
             return self.linear_stiffness, 0.0, max(self.linear_damping, 0.0)
         return self.stiffness, self.cubic_stiffness, max(self.damping, 0.0)
+
+    @property
+    def stiffness_noise_std(self) -> float:
+        """Standard deviation of K1 by noise alone, without what the law lacks [N m/rad]."""
+        own = self.covariance[0][0] - (self.misfit[0][0] if self.misfit else 0.0)
+        return float(max(own, 0.0) ** 0.5)
 
     def half_width(self, level: float = 0.95) -> tuple[float, float, float]:
         """Half widths of the intervals of K1, K3, D."""
@@ -105,8 +117,22 @@ class SpringResult:
             + " ".join(f"{v:.4g} +- {s:.2g}" for v, s in zip(term.values, term.stds, strict=True))
             for term in self.terms
         )
+        supported = ""
+        if self.verdict is Verdict.LINEAR and not self.terms:
+            stiffness, _, damping = self.law
+            supported = f" (K1 {stiffness:.5g}, D {damping:.4g} without K3)"
         return (
             f"{self.joint}: K1 {self.stiffness:.5g} +- {self.stiffness_std:.2g}, K3 {self.cubic_stiffness:.4g} +- "
-            f"{self.cubic_stiffness_std:.2g}, D {self.damping:.4g} +- {self.damping_std:.2g}{more}; {self.verdict}: "
-            f"{self.note}"
+            f"{self.cubic_stiffness_std:.2g}, D {self.damping:.4g} +- {self.damping_std:.2g}{more}; "
+            f"{self.verdict}{supported}: {self.note}"
+        )
+
+    def doubt(self) -> str | None:
+        """A sentence where the law leaves more than noise; None where it does not."""
+        if not self.misfit or self.noise is None:
+            return None
+        return (
+            f"spring of {self.joint}: its law leaves {self.rms_residual / max(self.noise, 1e-300):.2g} times the noise "
+            f"of its torque ({self.rms_residual:.3g} of {self.rms_torque:.3g}): it lacks something. Standard "
+            "deviations count this as random; diagnose tells what it is"
         )

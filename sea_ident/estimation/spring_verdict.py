@@ -64,15 +64,26 @@ def held_out_rms(columns: FloatArray, motion: Motion, joint: int, zero: float, t
 
 
 def verdict_of(
-    law: FloatArray, std: FloatArray, freedom: float, held_out: dict[str, float], spread: float, torque: float
+    law: FloatArray, std: FloatArray, freedom: float, held_out: dict[str, float], spread: str, torque: float
 ) -> tuple[Verdict, str]:
-    """Which terms the data support: significant, and better on pieces that were left out."""
+    """Which terms the data support: significant, and better on pieces that were left out.
+
+    Args:
+        law: (3,) K1, K3, D.
+        std: (3,) their standard deviations.
+        freedom: degrees of freedom of these.
+        held_out: rms by law on pieces that were left out [N m] or [N].
+        spread: standard deviation of the deflection, with its unit.
+        torque: standard deviation of the torque [N m] or [N].
+
+    Returns:
+        The verdict, and its reason in words.
+    """
     relative = std[0] / abs(law[0]) if law[0] != 0.0 else np.inf
     if relative > EXCITED or torque <= 0.0:
         return (
             Verdict.NOT_EXCITED,
-            f"stiffness known to {100 * min(relative, 99.0):.0f} % only: deflections of {spread:.2g} (rms) are too "
-            "small",
+            f"stiffness known to {100 * min(relative, 99.0):.0f} % only: deflections of {spread} (rms) are too small",
         )
     linear, cubic, hysteresis = held_out["linear"], held_out["cubic"], held_out["hysteresis"]
     limit = stats.norm.ppf(1 - SUPPORT / 2) if not np.isfinite(freedom) else stats.t.ppf(1 - SUPPORT / 2, freedom)

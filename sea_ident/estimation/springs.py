@@ -11,6 +11,7 @@ from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.period_scores import period_scores
+from sea_ident.estimation.spring_misfit import spring_misfit
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.spring_verdict import held_out_rms, verdict_of
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
@@ -113,6 +114,7 @@ def springs_from(
             tuple(len(effect.columns(robot)) for effect in effects if effect.joint == name),
             processed.places,
             processed.link_harmonics if processed.motor_harmonics > processed.link_harmonics else 0,
+            robot.joints[joint].position_unit,
         )
         result = _one_spring(data, name in unknown_zero)
         channels = processed.channels
@@ -156,6 +158,7 @@ class _SpringData:
     widths: tuple[int, ...] = ()
     places: tuple[int, ...] = (0,)
     harmonics: int = 0
+    unit: str = "rad"
 
     def answered(self, table: FloatArray) -> FloatArray:
         """(N, c) columns in the harmonics that q has, too."""
@@ -167,6 +170,12 @@ class _SpringData:
         state = (motion.q[:, i], motion.dq[:, i], motion.theta[:, i] - zero, motion.dtheta[:, i])
         more = [effect.local_columns(*state) for effect in self.effects]
         return np.column_stack([_columns(motion, i, zero), *more])
+
+    def left_in_periods(self, values: FloatArray, zero: float) -> FloatArray | None:
+        """(P, N) what values (3 + k,) leave of the torque of every period; None without periods."""
+        if self.per_period is None:
+            return None
+        return np.stack([tau - self.columns(motion, zero) @ values for motion, tau in self.per_period])
 
 
 def _columns(motion: Motion, joint: int, zero: float) -> FloatArray:
@@ -212,14 +221,24 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         extra = -(guess[0] + 3.0 * guess[1] * columns[:, :1] ** 2)
     values, inverse = _solve(data, zero, extra)
     residual = tau - np.column_stack([whole, extra]) @ values
-    full = _covariance(data, values[:count], inverse[:count], zero, residual)
+    law_values, law_inverse = values[:count], inverse[:count]
+    left = data.left_in_periods(law_values, zero)
+    full = _covariance(data, law_inverse, left, residual)
+    # a verdict is about noise: what the law lacks is no lack of excitation
+    noise_std = np.sqrt(np.maximum(np.diag(full), 0.0))
+    misfit = None
+    if left is not None:
+        misfit = spring_misfit(left, law_inverse, whole, data.rows, data.uncertainty, data.harmonics)
+        if misfit.covariance is not None:
+            full = full + misfit.covariance
     law, covariance = values[:3], full[:3, :3]
     freedom = data.uncertainty.degrees_of_freedom
     std = np.sqrt(np.maximum(np.diag(full), 0.0))
     own = [k for k in range(count) if k != 1]
     linear = np.linalg.lstsq(whole[:, own] / scale[own], tau, rcond=None)[0] / scale[own]
     held_out = held_out_rms(whole, motion, joint, zero, tau)
-    verdict, note = verdict_of(law, std, freedom, held_out, float(np.std(columns[:, 0])), float(np.std(tau)))
+    spread = f"{np.std(columns[:, 0]):.2g} {data.unit}"
+    verdict, note = verdict_of(law, noise_std, freedom, held_out, spread, float(np.std(tau)))
     return SpringResult(
         joint=name,
         stiffness=float(law[0]),
@@ -229,7 +248,7 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         damping=float(law[2]),
         damping_std=float(std[2]),
         verdict=verdict,
-        covariance=tuple(tuple(float(v) for v in row) for row in covariance),
+        covariance=_rows(covariance),
         degrees_of_freedom=float(freedom),
         linear_stiffness=float(linear[0]),
         linear_damping=float(linear[1]),
@@ -240,8 +259,14 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         held_out=held_out,
         note=note,
         terms=_terms(data, values, std),
-        full_covariance=tuple(tuple(float(v) for v in row) for row in full) if data.effects else (),
+        full_covariance=_rows(full) if data.effects else (),
+        noise=None if misfit is None else misfit.noise,
+        misfit=() if misfit is None or misfit.covariance is None else _rows(misfit.covariance[:3, :3]),
     )
+
+
+def _rows(table: FloatArray) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(v) for v in row) for row in table)
 
 
 def _terms(data: _SpringData, values: FloatArray, std: FloatArray) -> tuple[SpringTerm, ...]:
@@ -313,9 +338,7 @@ def _tell_apart(data: _SpringData, gram: FloatArray) -> None:
     )
 
 
-def _covariance(
-    data: _SpringData, law: FloatArray, inverse: FloatArray, zero: float, residual: FloatArray
-) -> FloatArray:
+def _covariance(data: _SpringData, inverse: FloatArray, left: FloatArray | None, residual: FloatArray) -> FloatArray:
     """(3 + k, 3 + k) covariance of K1, K3, D and the other effects, with that of the dynamic model in it.
 
     Every period moves the law in two ways that are not independent: by its own deflections, and by its share in the
@@ -323,14 +346,13 @@ def _covariance(
     """
     uncertainty = data.uncertainty
     step = inverse @ data.rows
-    if data.per_period is None:
+    if left is None:
         return np.asarray(
             step @ uncertainty.covariance @ step.T + _residual_covariance(inverse, residual), dtype=np.float64
         )
-    periods = len(data.per_period)
+    periods = len(left)
     factor = periods / (periods - 1.0)
-    residuals = np.stack([tau - data.columns(motion, zero) @ law for motion, tau in data.per_period])
-    residuals -= residuals.mean(axis=0)
+    residuals = left - left.mean(axis=0)
     direct = period_scores(residuals[:, :, None], inverse.T[:, None, :], data.places) / periods
     if uncertainty.kind in (CovarianceKind.PERIODS, CovarianceKind.REMAINDER) and periods >= FEW_PERIODS:
         moves = direct + uncertainty.influences @ step.T

@@ -113,7 +113,11 @@ def test_how_late_a_model_with_stiction_lets_go_is_told(settled, laboratory):
     bench, fit, before = settled
     sizes = 1.0 + 0.2 * np.resize([-1.0, 1.0], bench.data.periods)
     held = Bench(with_stiction(bench.data, sizes - before), laboratory.effects)
-    model = (*fit.effects, make_effect("stribeck_friction", "knee"), make_effect("stribeck_friction", "hip"))
+    model = (
+        *fit.effects,
+        make_effect("stribeck_friction", "knee", speed=0.01),
+        make_effect("stribeck_friction", "hip"),
+    )
     now = settle(held, model)
     rest = held.fit(now.fit.effects[:-2] + now.fit.effects[-1:], now.noise, start=now.fit.parameters, tangents=False)
     expected = breakaway_excess(held, rest, "knee")
@@ -125,6 +129,20 @@ def test_how_late_a_model_with_stiction_lets_go_is_told(settled, laboratory):
     assert found.excess == pytest.approx(1.0, abs=0.3)
     assert stiction(held, now.fit, len(model) - 1, now.noise) is None
     assert stiction(held, now.fit, 0, now.noise) is None
+
+
+def test_friction_that_falls_at_speeds_at_which_it_slides_is_no_stiction(settled, laboratory):
+    """Its law has the larger torque at low speed already, so nothing is said of a motor that sticks."""
+    bench, fit, _ = settled
+    motion = bench.data.motion
+    falling = make_effect("stribeck_friction", "knee", speed=0.1)
+    added = 3.0 * falling.local_columns(*(getattr(motion, k)[:, 1] for k in ("q", "dq", "theta", "dtheta")))[:, 0]
+    torque = bench.data.period_tau_motor + np.column_stack([0.0 * added, added, 0.0 * added])
+    held = Bench(replace(bench.data, tau_motor=torque.mean(axis=0), period_tau_motor=torque), laboratory.effects)
+    now = settle(held, (*fit.effects, falling))
+    rest = held.fit(fit.effects, now.noise, start=now.fit.parameters, tangents=False)
+    assert lets_go_late(held, rest, falling)  # beside the model without it, it does
+    assert stiction(held, now.fit, len(now.fit.effects) - 1, now.noise) is None
 
 
 def test_stiction_is_told_with_its_spread():

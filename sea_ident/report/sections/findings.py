@@ -139,9 +139,11 @@ def _springs(model: Model) -> list[Finding]:
         unit = model.robot.joints[model.robot.index(spring.joint)].torque_unit
         share = spring.rms_residual / max(spring.rms_torque, 1e-300)
         good = spring.verdict in (Verdict.LINEAR, Verdict.STIFFENING) and share < POOR_SPRING and spring.stiffness > 0.0
+        good = good and not spring.misfit
+        noise = "" if spring.noise is None else f", noise {spring.noise:.2g} {unit}"
         text = (
             f"{str(spring.verdict).replace('_', ' ')}: {spring.note}; it leaves {spring.rms_residual:.3g} of "
-            f"{spring.rms_torque:.3g} {unit} rms ({100.0 * share:.2g} %)."
+            f"{spring.rms_torque:.3g} {unit} rms ({100.0 * share:.2g} %{noise})."
         )
         found.append(Finding("good" if good else "warn", f"{spring.joint} spring", text))
     return found
