@@ -184,6 +184,7 @@ def detectability(
                 absorbed=float(np.clip(absorbed, 0.0, 1.0)),
                 confusable_with=tuple(alike),
                 shapes=_shapes(bench, effect),
+                title=candidate.effect.title,
             )
         )
     return tuple(sorted(out, key=lambda d: (d.effect, str(d.joint))))

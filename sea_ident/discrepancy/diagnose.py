@@ -41,6 +41,7 @@ from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
+from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
@@ -111,13 +112,16 @@ def diagnose(
             return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
     whole = period_data(processed, robot)
     data, notes = check.cleaned(whole, recording)
+    misplaced = misplaced_columns(robot, model.effects, processed)
+    if misplaced is not None:
+        notes = check.Findings((*notes.warnings, misplaced), fatal=True)
     temperature = check.temperatures(recording, data)
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
     basic = completed(bench)
     if basic is not None:
         found = _compared(bench, confirm(bench, basic.selection), temperature)
-    elif data.periods < FEWEST_TO_SEARCH:
+    elif data.periods < FEWEST_TO_SEARCH or misplaced is not None:
         found = _compared(bench, confirm(bench, _unsearched(bench)), temperature)
     else:
         found = _searched(bench, temperature, tell)

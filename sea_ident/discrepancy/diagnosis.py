@@ -135,6 +135,7 @@ class Diagnosis:
                     "effect": d.effect, "joint": d.joint, "smallest": d.smallest if np.isfinite(d.smallest) else None,
                     "unit": d.unit, "absorbed": d.absorbed, "confusable_with": list(d.confusable_with),
                     "shapes": [{"name": name, "value": value, "unit": unit} for name, value, unit in d.shapes],
+                    "title": d.title,
                 }
                 for d in self.detectability
             ],
@@ -253,6 +254,7 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
                 d["effect"], d["joint"], float("inf") if d["smallest"] is None else _finite(d["smallest"]), d["unit"],
                 _finite(d["absorbed"]), tuple(str(other) for other in d["confusable_with"]),
                 tuple((str(x["name"]), _finite(x["value"]), str(x["unit"])) for x in d.get("shapes", [])),
+                str(d.get("title", "")),
             )
             for d in record["detectability"]
         ),

@@ -248,6 +248,7 @@ class Detectability:
         absorbed: share of the effect that the other parameters absorb [-].
         confusable_with: effects (`name` or `name at joint`) that look like it in this motion.
         shapes: name, value and unit of the nonlinear parameters that it has there; of others the smallest differs.
+        title: name and joint, for people, and what tells it from another of its kind there; these two alone if empty.
     """
 
     effect: str
@@ -257,6 +258,12 @@ class Detectability:
     absorbed: float
     confusable_with: tuple[str, ...]
     shapes: tuple[tuple[str, float, str], ...] = ()
+    title: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Name, with what tells it from another of its kind at its joint."""
+        return self.title.replace(f" at {self.joint}", "", 1) or self.effect
 
 
 @dataclass(frozen=True, eq=False)

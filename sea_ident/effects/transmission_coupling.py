@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, SimulationState
-from sea_ident.effects.base import Anchor, Column, Effect, Shape, smooth_sign
+from sea_ident.effects.base import Anchor, Column, Effect, Shape, smooth_sign, titled
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
@@ -61,6 +61,11 @@ class TransmissionCoupling(Effect):
             if 0 <= k < len(names) and robot.joints[i].actuator is not None
         ]
         return tuple(cls(joint=joint, other=other) for joint, other in pairs)
+
+    @property
+    def title(self) -> str:
+        """Name and joint, and the joint that its transmission passes: one motor may have two couplings."""
+        return titled(self.name, self.joint) + ("" if self.other is None else f" from {self.other}")
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """The ratio r times the inertia, the viscous and the Coulomb friction of the motor."""

@@ -17,6 +17,7 @@ from sea_ident.effects.state import Side
 from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
+from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.repeated_steps import repeated_steps
@@ -146,7 +147,7 @@ def identify_observed(
     tell("comparing the periods", 0.75)
     uncertainty = honest_uncertainty(observations, estimate)
     found.extend([*estimate.warnings, *uncertainty.warnings])
-    found.extend(check_signs(observations))
+    found.extend(check_signs(observations, misplaced_columns(robot, chosen, processed)))
     steps = repeated_steps(observations, how)
     model = _model(observations, estimate, uncertainty if steps is None else steps.widened(uncertainty), how.name)
     if prior is not None:

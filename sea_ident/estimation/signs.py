@@ -8,11 +8,12 @@ from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 
 
-def check_signs(observations: Observations) -> list[str]:
+def check_signs(observations: Observations, misplaced: str | None = None) -> list[str]:
     """Sentences about joints whose inertia comes out negative.
 
     Args:
         observations: the recording and the model.
+        misplaced: what is known to be wrong with the columns; then that is the reason.
 
     Returns:
         One for each such joint; none where all signs may be right.
@@ -26,11 +27,14 @@ def check_signs(observations: Observations) -> list[str]:
     names = [name for name, bad in zip(robot.joint_names, negative, strict=True) if bad]
     if names and len(names) == robot.n:
         raise IdentificationError(
-            f"{source}: the inertia comes out negative in every joint "
+            misplaced
+            or f"{source}: the inertia comes out negative in every joint "
             f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
             f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on). Or are the columns of "
             "joints interchanged?"
         )
+    if misplaced is not None:
+        return [misplaced]
     return [
         f"{source}: the inertia that joint {name!r} moves comes out negative from its own torque: has that torque or "
         f"current the wrong sign? Then exchange it ({_exchanged(name)}). Or is it that of another joint? The other "

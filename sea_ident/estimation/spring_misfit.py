@@ -42,6 +42,7 @@ def spring_misfit(
     rows: FloatArray,
     uncertainty: Uncertainty,
     harmonics: int = 0,
+    repeated: float = 0.0,
 ) -> SpringMisfit:
     """Hold what a law leaves of the mean torque of a spring against the scatter of the periods.
 
@@ -55,6 +56,7 @@ def spring_misfit(
         rows: (N, b) by which the base parameters change the mean torque.
         uncertainty: of the base parameters, with an influence of every period.
         harmonics: of a period that count; all where 0.
+        repeated: rms of the torque that errors of the encoders make which are the same in every period [N m] or [N].
 
     Returns:
         The misfit.
@@ -69,6 +71,7 @@ def spring_misfit(
     rest = uncertainty.covariance - uncertainty.repeatability
     gram = own.T @ own / len(own)
     variance = float(np.mean(np.sum(moves**2, axis=1))) * scale + max(float(np.sum(gram * rest)), 0.0)
+    variance += repeated**2
     energy = float(np.mean(mean**2))
     noise, ratio = float(np.sqrt(variance)), float(np.sqrt(energy / max(variance, 1e-300)))
     freedom = _freedom(direct, gram @ uncertainty.covariance)

@@ -115,6 +115,7 @@ def springs_from(
             processed.places,
             processed.link_harmonics if processed.motor_harmonics > processed.link_harmonics else 0,
             robot.joints[joint].position_unit,
+            _repeated(processed, int(joint)),
         )
         result = _one_spring(data, name in unknown_zero)
         channels = processed.channels
@@ -131,6 +132,12 @@ def springs_from(
     return tuple(results)
 
 
+def _repeated(processed: ProcessedRecording, joint: int) -> float:
+    """Rms of what repeats in the deflection of a joint because of steps of its encoders [rad] or [m]."""
+    steps = processed.encoder_steps
+    return 0.0 if steps is None else float(np.hypot(steps.link_error[joint], steps.motor_error[joint]))
+
+
 def spring_from_torque(name: str, joint: int, motion: Motion, torque: FloatArray, unknown_zero: bool) -> SpringResult:
     """A spring from its torque (N,) as it was measured [N m], with the uncertainty that the residual shows."""
     none = np.zeros((1, 1))
@@ -143,6 +150,7 @@ def spring_from_torque(name: str, joint: int, motion: Motion, torque: FloatArray
 class _SpringData:
     """What is known of one spring: its torque as the dynamic model gives it, with rows (N, b) for its uncertainty.
 
+    `repeated` is the rms of errors of the deflection that are the same in every period, as steps of encoders are.
     `harmonics` are those of q where theta has more, else 0. Harmonics of theta without those of q beside them would be
     deflections that no torque of the link answers.
     """
@@ -159,6 +167,7 @@ class _SpringData:
     places: tuple[int, ...] = (0,)
     harmonics: int = 0
     unit: str = "rad"
+    repeated: float = 0.0
 
     def answered(self, table: FloatArray) -> FloatArray:
         """(N, c) columns in the harmonics that q has, too."""
@@ -228,7 +237,8 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
     noise_std = np.sqrt(np.maximum(np.diag(full), 0.0))
     misfit = None
     if left is not None:
-        misfit = spring_misfit(left, law_inverse, whole, data.rows, data.uncertainty, data.harmonics)
+        repeated = abs(float(law_values[0])) * data.repeated
+        misfit = spring_misfit(left, law_inverse, whole, data.rows, data.uncertainty, data.harmonics, repeated)
         if misfit.covariance is not None:
             full = full + misfit.covariance
     law, covariance = values[:3], full[:3, :3]

@@ -142,9 +142,16 @@ def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArra
     beyond = mean * np.sqrt(np.where(large, 1.0 - 1.0 / ratio, 0.0))
     names = observations.robot.joint_names
     parts = ", ".join(f"{names[i]} {ratio[i] ** 0.5:.2g} times" for i in np.flatnonzero(large))
+    steps = observations.processed.encoder_steps
+    if steps is not None and np.all(steps.joints[large]):
+        cause = (
+            "the steps of these encoders, which repeat in every period, may be all of it, or the model lacks something"
+        )
+    else:
+        cause = "the model lacks something"
     text = (
-        f"the residual of the mean is larger than its noise ({parts}): the model lacks something. Standard deviations "
-        "count this as random; diagnose tells what it is"
+        f"the residual of the mean is larger than its noise ({parts}): {cause}. Standard deviations count this as "
+        "random; diagnose tells what it is"
     )
     return _scores(observations, estimate, beyond), text
 

@@ -16,6 +16,9 @@ from sea_ident.motion import FourierSeries
 
 FORMAT = "sea_ident excitation"
 VERSION = 1
+_EXACT = ("position", "velocity", "acceleration")
+"""Limits whose margins are the smallest distances themselves; those of others are proven."""
+
 _DISTANCES = 5
 """Distances between links that a summary shows."""
 
@@ -35,7 +38,8 @@ class Excitation:
         raw_condition_number: of F as it is.
         parameters: (p,) names of the columns of F.
         samples: samples per period in F.
-        margins: smallest distance to every limit over all t, in the unit of the limit; >= 0 is inside.
+        margins: smallest distance to every limit over all t, in the unit of the limit; >= 0 is inside. That of torques,
+            deflections and distances between bodies is proven, so it is more in truth where it is large.
         limits: lower and upper value of every limit.
         starts: number of random starts that were climbed from.
         start_values: criterion that each start reached.
@@ -102,10 +106,11 @@ class Excitation:
         lines = []
         for name in shown:
             lower, upper = self.limits[name]
-            lines.append(f"  {name:<{width}}  [{lower:.5g}, {upper:.5g}]  margin {self.margins[name]:.3g}")
+            proven = "" if name.rpartition(".")[2] in _EXACT else "at least "
+            lines.append(f"  {name:<{width}}  [{lower:.5g}, {upper:.5g}]  margin {proven}{self.margins[name]:.3g}")
         if left_out:
             least = self.margins[left_out[0]]
-            lines.append(f"  {len(left_out)} more pairs of links  margin {least:.3g} at least")
+            lines.append(f"  {len(left_out)} more pairs of links  margin at least {least:.3g}")
         return lines
 
     def to_dict(self) -> dict[str, Any]:

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.motion import Motion
 from sea_ident.processing.harmonics import differentiate
 
@@ -36,17 +37,24 @@ class EncoderSteps:
         motor: (n,) steps of theta.
         link_error: (n,) standard deviation of what repeats in q [rad] or [m]; 0 where steps average out.
         motor_error: (n,) the same of theta.
+        elastic: (m,) joints that have an encoder of theta; that of q is the only one of the others.
     """
 
     link: FloatArray
     motor: FloatArray
     link_error: FloatArray
     motor_error: FloatArray
+    elastic: IntArray
 
     @property
     def repeat(self) -> bool:
         """Whether steps of any encoder repeat."""
         return bool(np.any(self.link_error > 0.0) or np.any(self.motor_error > 0.0))
+
+    @property
+    def joints(self) -> NDArray[np.bool_]:
+        """(n,) joints with an encoder whose steps repeat."""
+        return np.asarray((self.link_error > 0.0) | (self.motor_error > 0.0))
 
     def words(self, joint_names: tuple[str, ...]) -> str:
         """Which encoders have steps that repeat, with numbers."""
@@ -72,7 +80,9 @@ class EncoderSteps:
             Errors of q, q', q'' and of theta, theta', theta'', each (N, n).
         """
         link = _errors(motion.q, self.link, self.link_error, rng)
-        motor = _errors(motion.theta, self.motor, self.motor_error, rng)
+        motor = link.copy()
+        own = _errors(motion.theta, self.motor, self.motor_error, rng)
+        motor[:, self.elastic] = own[:, self.elastic]
         return differentiate(link, period, harmonics[0]), differentiate(motor, period, harmonics[1])
 
 
@@ -100,7 +110,7 @@ def step_of(values: FloatArray) -> float:
 
 
 def encoder_steps(
-    link: FloatArray, motor: FloatArray, link_stack: FloatArray, motor_stack: FloatArray
+    link: FloatArray, motor: FloatArray, link_stack: FloatArray, motor_stack: FloatArray, elastic: IntArray
 ) -> EncoderSteps | None:
     """The steps of all encoders.
 
@@ -109,6 +119,7 @@ def encoder_steps(
         motor: (M, n) theta.
         link_stack: (P, N, n) q of the periods.
         motor_stack: (P, N, n) theta of the periods.
+        elastic: (m,) joints that have an encoder of theta.
 
     Returns:
         The steps; None where none repeats, or where a single period cannot tell.
@@ -120,7 +131,9 @@ def encoder_steps(
         steps = np.array([step_of(column) for column in values.T])
         parts.append((steps, _repeated(stack, steps) if np.any(steps > 0.0) else np.zeros_like(steps)))
     (links, link_errors), (motors, motor_errors) = parts
-    found = EncoderSteps(links, motors, link_errors, motor_errors)
+    rigid = np.setdiff1d(np.arange(link.shape[1]), elastic)
+    motors[rigid], motor_errors[rigid] = 0.0, 0.0
+    found = EncoderSteps(links, motors, link_errors, motor_errors, elastic)
     return found if found.repeat else None
 
 

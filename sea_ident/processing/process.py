@@ -233,7 +233,7 @@ def _periodic(
         places=tuple(keep),
         link_harmonics=int(links),
         motor_harmonics=int(motors),
-        encoder_steps=encoder_steps(signals.q, signals.theta, cuts["q"], cuts["theta"]),
+        encoder_steps=encoder_steps(signals.q, signals.theta, cuts["q"], cuts["theta"], elastic),
         notes=tuple(notes),
         warnings=tuple(found),
     )

@@ -3,14 +3,26 @@
 import numpy as np
 import pytest
 
-from estimation.synthetic import record
+from estimation.synthetic import record, truth_of
 from sea_ident.estimation import identify, repeated_steps
+from sea_ident.motion import FourierSeries
 from sea_ident.processing import process
 from sea_ident.processing.encoder_steps import step_of
 from sea_ident.processing.harmonics import within
 from sea_ident.recordings import Recording
+from sea_ident.robot import robot_from_text
 
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+
+RIGID = """<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0.02 0.01 -0.2"/><mass value="3"/>
+<inertia ixx="0.03" iyy="0.03" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="lower"><inertial><origin xyz="0 0.01 -0.15"/><mass value="2"/>
+<inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="first" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="5" effort="100"/></joint>
+<joint name="second" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/>
+<axis xyz="1 0 0"/><limit lower="-3" upper="3" velocity="5" effort="100"/></joint></robot>"""
 
 STEP = 2.0 * np.pi / 2**14
 
@@ -42,6 +54,8 @@ def test_steps_that_repeat_are_told_and_counted(leg, truth):
         np.testing.assert_allclose(processed.encoder_steps.motor, STEP, rtol=1e-9)
         model = identify(leg, processed)
         assert any("encoder steps do not average out" in text for text in model.warnings)
+        # what they make of the deflection is no law that a spring lacks
+        assert not any("its law leaves" in text for text in model.warnings)
         outside.extend(abs(s.stiffness - leg.spring(s.joint).stiffness) > s.half_width()[0] for s in model.springs)
         # what a repetition does not show counts, too
         assert np.all(model.std > np.sqrt(np.diag(model.uncertainty.repeatability)))
@@ -61,6 +75,24 @@ def test_what_steps_change_is_seen_in_a_few_periods(leg, truth, monkeypatch):
     np.testing.assert_allclose(np.sqrt(more[0]), np.sqrt(more[1]), rtol=0.1)
     known = [[s.stiffness_std for s in m.springs] for m in (few, whole)]
     np.testing.assert_allclose(*known, rtol=0.1)
+
+
+def test_a_rigid_joint_has_one_encoder():
+    """Its motor errs as its link does, and no column that is not there is named."""
+    robot = robot_from_text(RIGID, "arm")
+    a, b = np.random.default_rng(4).normal(0.0, 0.3, (2, robot.n, 5))
+    truth = truth_of(robot, FourierSeries(0.1, np.zeros(robot.n), a, b))
+    processed = process(rounded(robot, truth, 0, STEP), robot, period=10.0, link_harmonics=200)
+    steps = processed.encoder_steps
+    assert np.all(steps.link_error > 0.0)
+    assert "theta" not in steps.words(robot.joint_names)
+    link, motor = steps.another(processed.motion, 10.0, (20, 20), np.random.default_rng(0))
+    for own, other in zip(link, motor, strict=True):
+        np.testing.assert_array_equal(own, other)
+    model = identify(robot, processed)
+    told = [text for text in model.warnings if "larger than its noise" in text]
+    assert all("the steps of these encoders, which repeat in every period, may be all of it" in text for text in told)
+    assert told
 
 
 def test_steps_below_the_noise_average_out(leg, truth):
