@@ -35,12 +35,20 @@ def test_wrong_sign_of_the_torque_is_found(leg, truth):
         identify(leg, flipped, period=10.0)
 
 
-def test_wrong_sign_in_one_joint_is_named(leg, truth):
+@pytest.mark.parametrize(
+    ("joint", "text"),
+    [
+        ("hip", "tau_motor_hip has the other sign, by the other joints"),
+        # what it moves is too little for the others to tell
+        ("ankle", "'ankle' moves comes out negative"),
+    ],
+)
+def test_wrong_sign_in_one_joint_is_named(leg, truth, joint, text):
     recording = record(leg, truth, 8, torque_noise=0.1)
-    flipped = recording.replace_columns({"tau_motor_hip": -recording.columns["tau_motor_hip"]})
+    flipped = recording.replace_columns({f"tau_motor_{joint}": -recording.columns[f"tau_motor_{joint}"]})
     with pytest.warns(SeaIdentWarning) as caught:
         identify(leg, flipped, period=10.0)
-    assert any("'hip' moves comes out negative" in str(w.message) for w in caught)
+    assert any(text in str(w.message) for w in caught)
 
 
 def test_shorter_than_a_period(leg, truth):
