@@ -38,7 +38,9 @@ from sea_ident.discrepancy.standing import longest_standing
 from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
+from sea_ident.effects.orders import motors_too_fast
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.state import State
 
 FEWEST_PERIODS = 10
 """Periods from which on an effect is named without reservation."""
@@ -130,7 +132,7 @@ def conclude(
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
         kind=None if held is None else held.kind, nameless=nameless, sound=not notes.fatal,
-        standing=standing,
+        standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)),
     )  # fmt: skip
     found = Diagnosis(
         verdict=verdict,

@@ -42,6 +42,7 @@ class Facts:
         nameless: what explains the recording better in the place of an effect that was found, and has no name.
         sound: whether the recording allows a conclusion; warnings say why where it does not.
         standing: what is not compared beside reversals, at the joint where that is most.
+        motors_too_fast: joints whose motors turn too fast for the samples to show a ripple of theirs.
     """
 
     verdict: Verdict
@@ -58,6 +59,7 @@ class Facts:
     nameless: tuple[Unnamed, ...] = ()
     sound: bool = True
     standing: Standing | None = None
+    motors_too_fast: tuple[str, ...] = ()
 
     @property
     def added(self) -> tuple[MissingEffect, ...]:
@@ -80,6 +82,11 @@ def paragraph(facts: Facts) -> str:
         parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
     if facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
         parts.append(f"{_not_compared(facts, facts.standing)}.")
+    if facts.verdict in (Verdict.NONE, Verdict.NOT_IN_LIBRARY) and facts.motors_too_fast:
+        parts.append(
+            f"Ripple of the turns of the motor of {', '.join(facts.motors_too_fast)} is too fast for these samples and "
+            "was not looked for; sample faster or move slower."
+        )
     if facts.verdict is Verdict.SUSPECT:
         fully = "" if _part(facts) is None else " as well"
         parts.append(

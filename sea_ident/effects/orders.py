@@ -22,13 +22,10 @@ def orders(state: State, joint: str, most: int) -> tuple[float, ...]:
     Returns:
         Rising orders, at least one [1/rad] or [1/m].
     """
-    robot, motion = state.robot, state.motion
+    robot = state.robot
     i = robot.index(joint)
-    theta, speed = motion.theta[:, i], np.abs(motion.dtheta[:, i])
-    span = max(float(np.ptp(theta)), 1e-9)
-    step = float(motion.time[-1] - motion.time[0]) / max(len(motion) - 1, 1)
-    fastest = max(float(np.quantile(speed, 0.9)), 1e-9)
-    highest = 2.0 * np.pi / (4.0 * step * fastest)
+    span = max(float(np.ptp(state.motion.theta[:, i])), 1e-9)
+    highest = highest_order(state, joint)
     spacing = 2.0 / span
     lowest = min(1.0, spacing) if not robot.joints[i].prismatic else spacing
     grid = lowest + spacing * np.arange(most)
@@ -36,3 +33,26 @@ def orders(state: State, joint: str, most: int) -> tuple[float, ...]:
     found = np.unique(np.concatenate([grid, gear]))
     found = found[found <= highest]
     return tuple(float(order) for order in found) if len(found) else (float(lowest),)
+
+
+def highest_order(state: State, joint: str) -> float:
+    """Order of a ripple that this motion passes with four samples a period [1/rad] or [1/m].
+
+    Args:
+        state: robot and motion.
+        joint: the joint.
+    """
+    motion = state.motion
+    speed = np.abs(motion.dtheta[:, state.robot.index(joint)])
+    step = float(motion.time[-1] - motion.time[0]) / max(len(motion) - 1, 1)
+    return float(2.0 * np.pi / (4.0 * step * max(float(np.quantile(speed, 0.9)), 1e-9)))
+
+
+def motors_too_fast(state: State) -> tuple[str, ...]:
+    """Joints of which no ripple of a whole turn of the motor is looked for: the samples are too few for it.
+
+    Args:
+        state: robot and motion.
+    """
+    ratios = zip(state.robot.joint_names, state.robot.gear_ratios, strict=True)
+    return tuple(joint for joint, ratio in ratios if ratio > 1.0 and ratio > highest_order(state, joint))

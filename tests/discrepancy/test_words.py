@@ -65,6 +65,15 @@ def test_what_acts_on_the_whole_robot_has_no_joint_in_words():
         assert f"does not tell {told}" in paragraph(replace(facts(Verdict.AMBIGUOUS), missing=missing))
 
 
+def test_motors_that_turn_too_fast_are_told_where_something_may_have_escaped():
+    told = "Ripple of the turns of the motor of hip, knee is too fast for these samples and was not looked for"
+    for verdict in (Verdict.NONE, Verdict.NOT_IN_LIBRARY):
+        found = facts(verdict)
+        assert told not in paragraph(found)
+        assert told in paragraph(replace(found, motors_too_fast=("hip", "knee")))
+    assert told not in paragraph(replace(facts(Verdict.NAMED), motors_too_fast=("hip", "knee")))
+
+
 @pytest.mark.parametrize("verdict", [Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER])
 def test_few_periods_are_said_before_the_name(verdict):
     assert paragraph(facts(verdict)).startswith("The model lacks torque_offset at hip")

@@ -1,0 +1,41 @@
+"""Orders of ripple that a motion shows: up to four samples a period, whole turns of the motor among them."""
+
+import numpy as np
+import pytest
+
+from sea_ident.effects import make_effect
+from sea_ident.effects.orders import highest_order, motors_too_fast, orders
+from sea_ident.effects.state import State
+from sea_ident.motion import Motion
+from sea_ident.robot import load_robot
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return load_robot("exo_leg")
+
+
+def turning(leg, speeds, step=0.005):
+    """Every joint turning at its own speed [rad/s]."""
+    time = step * np.arange(2001)
+    speed = np.ones((len(time), 1)) * np.asarray(speeds)
+    return State(leg, Motion.rigid(time, time[:, None] * speed, speed, np.zeros_like(speed)))
+
+
+def test_the_highest_order_is_passed_with_four_samples_a_period(leg):
+    state = turning(leg, [0.5, 1.0, 2.0])
+    for joint, speed in zip(leg.joint_names, (0.5, 1.0, 2.0), strict=True):
+        highest = highest_order(state, joint)
+        assert 2.0 * np.pi / (highest * speed * 0.005) == pytest.approx(4.0)
+        assert max(orders(state, joint, 300)) <= highest
+
+
+def test_motors_that_turn_too_fast_have_no_ripple_of_theirs_in_the_search(leg):
+    ratios = dict(zip(leg.joint_names, leg.gear_ratios, strict=True))
+    limit = [2.0 * np.pi / (4.0 * 0.005 * ratio) for ratio in ratios.values()]
+    slow, fast = turning(leg, [0.9 * v for v in limit]), turning(leg, [0.9 * limit[0], 1.1 * limit[1], 0.9 * limit[2]])
+    assert motors_too_fast(slow) == ()
+    assert motors_too_fast(fast) == (leg.joint_names[1],)
+    for state, there in ((slow, True), (fast, False)):
+        tried = {one.order for one in make_effect("torque_ripple", leg.joint_names[1]).variants(state)}
+        assert (ratios[leg.joint_names[1]] in tried) is there
