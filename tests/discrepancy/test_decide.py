@@ -28,8 +28,8 @@ JOINT = "knee"
 def rivals(laboratory):
     """An offset in the spring of the knee, fitted by itself and by hysteresis, and another motion of the same leg."""
     planted = [("spring_offset", JOINT, [0.5], {})]
-    bench = laboratory.bench(laboratory.record(planted, periods=12))
-    other = Bench(laboratory.data(laboratory.record(planted, periods=16, seed=9, motion=1)), bench.effects)
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    other = Bench(laboratory.data(laboratory.record(planted, periods=10, seed=9, motion=1)), bench.effects)
     start = settle(bench, bench.effects)
     found = {c.effect.name: c for c in scan(bench, start.fit, start.noise) if c.effect.joint == JOINT}
     fits = {
