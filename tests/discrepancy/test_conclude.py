@@ -103,9 +103,9 @@ def test_the_planted_effect_is_in_no_library():
 @pytest.mark.slow
 def test_what_does_not_hold_on_another_motion_is_suspect(laboratory):
     """A disturbance that looks like a ripple is there on one day, and has turned round on another."""
-    training = laboratory.record([RIPPLE], periods=12)
+    training = laboratory.record([RIPPLE], periods=8)
     turned = ("torque_ripple", "hip", [-1.0, -0.5], {"order": 4.0})
-    found = diagnosed(laboratory, training, holdout=laboratory.record([turned], motion=1, periods=12, seed=9))
+    found = diagnosed(laboratory, training, holdout=laboratory.record([turned], motion=1, periods=6, seed=9))
     assert found.verdict is Verdict.SUSPECT
     assert names(found) == [("torque_ripple", "hip")]
     assert found.missing[0].transfer < 0.0
