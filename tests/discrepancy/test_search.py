@@ -28,7 +28,7 @@ def unequal(laboratory):
         ("torque_offset", "knee", [-2.0], {}),
         ("stribeck_friction", "hip", [2.0], {"speed": 0.1, "exponent": 2.0}),
     ]
-    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    bench = laboratory.bench(laboratory.record(planted, periods=8))
     return bench, search(bench, bench.effects)
 
 
