@@ -27,7 +27,7 @@ def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(leg, series, name, 
     for number in range(3):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeaIdentWarning)
-            recording = simulate(leg, motion, periods=16, seed=1 + number, effects=[hidden]).recording
+            recording = simulate(leg, motion, periods=10, seed=1 + number, effects=[hidden]).recording
             found = sea_ident.diagnose(sea_ident.identify(leg, recording, period=PERIOD), recording)
         verdicts.append(found.verdict)
         if found.next_experiment is None:
