@@ -15,7 +15,6 @@ from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, Miss
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries
-from sea_ident.simulation import PlantedEffect, simulate
 
 PERIOD = 5.0
 
@@ -24,17 +23,12 @@ def scaled(series, amplitude):
     return FourierSeries(series.base_frequency, series.offset, amplitude * series.a, amplitude * series.b)
 
 
-def recorded(leg, series, planted=(), periods=12, seed=70):
-    return simulate(leg, series, periods=periods, seed=seed, effects=planted).recording
-
-
-def named(name, joint, values, **shape):
-    return PlantedEffect(make_effect(name, joint, **shape), np.array(values, dtype=float))
+RIPPLE = ("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})
 
 
 @pytest.fixture(scope="module")
-def intact(leg, series):
-    return recorded(leg, series[0])
+def intact(laboratory):
+    return laboratory.record(periods=10)
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +52,8 @@ def test_none(model, intact):
     assert quietly(model, intact).verdict is Verdict.NONE
 
 
-def test_named_and_held_out_periods_are_called_weaker(leg, series):
-    recording = recorded(leg, series[0], [named("torque_ripple", "hip", [1.0, 0.5], order=4.0)])
+def test_named_and_held_out_periods_are_called_weaker(laboratory, leg):
+    recording = laboratory.record([RIPPLE], periods=10)
     found = quietly(identified(leg, recording), recording)
     assert found.verdict is Verdict.NAMED
     assert (found.missing[0].effect, found.missing[0].joint) == ("torque_ripple", "hip")
@@ -71,8 +65,9 @@ def test_named_and_held_out_periods_are_called_weaker(leg, series):
 
 
 @pytest.mark.scenario
-def test_ambiguous_with_the_experiment_that_tells(leg, series):
-    recording = recorded(leg, scaled(series[0], 0.3), [named("spring_offset", "knee", [0.5])])
+def test_ambiguous_with_the_experiment_that_tells(laboratory, leg, series):
+    small = replace(laboratory, motions=(scaled(series[0], 0.3),))
+    recording = small.record([("spring_offset", "knee", [0.5], {})], periods=10)
     found = quietly(identified(leg, recording), recording)
     assert found.verdict is Verdict.AMBIGUOUS
     assert {"spring_offset", "encoder_offset"} >= {m.effect for m in found.missing}
@@ -96,10 +91,10 @@ def test_not_in_the_library_though_something_much_like_it_is(model, intact):
     assert "The same as torque_ripple at knee, but growing with the load, leaves" in found.text
 
 
-def test_only_against_the_reference(leg, series, model):
+def test_only_against_the_reference(laboratory, leg, model):
     payload = make_effect("payload", "ankle")
     values = np.resize([1.5, 0.0, 0.0, 0.15, 0.05, 0.05, 0.01, 0.0, 0.0, 0.0], len(payload.columns(leg)))
-    recording = recorded(leg, series[0], [PlantedEffect(payload, values)])
+    recording = laboratory.record([(payload, values)], periods=10)
     refitted = identified(leg, recording)
     found = quietly(refitted, recording, reference=model)
     assert found.verdict is Verdict.ONLY_AGAINST_REFERENCE
@@ -114,14 +109,13 @@ def test_a_reference_whose_effects_the_recording_cannot_show_is_not_compared_and
     assert "temperature" in said[0]
 
 
-def test_cannot_tell_from_one_pass(leg, series, model):
-    motion = recorded(leg, series[0], periods=1)
-    assert quietly(model, motion).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
+def test_cannot_tell_from_one_pass(laboratory, model):
+    assert quietly(model, laboratory.record(periods=1)).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
 
 
-def test_of_three_periods_nothing_fine_is_named(leg, series):
+def test_of_three_periods_nothing_fine_is_named(laboratory, leg):
     """What is missing shows in them, but not how they scatter along it."""
-    recording = recorded(leg, series[0], [named("torque_ripple", "hip", [1.0, 0.5], order=4.0)], periods=3)
+    recording = laboratory.record([RIPPLE], periods=3)
     found = quietly(identified(leg, recording), recording)
     assert found.lack_of_fit.p_value < 1e-3
     assert (found.verdict, found.missing) == (Verdict.CANNOT_TELL, ())
@@ -281,8 +275,8 @@ def test_a_clipped_torque_gets_no_confident_name(leg, model, intact):
     assert any("clipped" in text for text in found.warnings)
 
 
-def test_a_holdout_of_one_period_is_said_to_test_nothing(leg, series, model, intact):
-    once = recorded(leg, series[1], periods=1)
+def test_a_holdout_of_one_period_is_said_to_test_nothing(laboratory, model, intact):
+    once = laboratory.record(periods=1, motion=1)
     try:
         found = quietly(model, intact, holdout=once)
     except SeaIdentError:
