@@ -41,6 +41,12 @@ KINDS = {
 QUICK = ("signal",)
 
 
+def recorded(laboratory, kind):
+    """Below ten periods a diagnosis does not look beside reversals, where the friction of "shape" is."""
+    effect, _ = KINDS[kind]
+    return laboratory.record([(effect.effect, effect.values)], periods=12 if kind == "shape" else 8, seed=70)
+
+
 def diagnosed(model, recording):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
@@ -54,9 +60,9 @@ def identified(leg, recording, **options):
 
 
 @pytest.mark.parametrize("kind", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in KINDS])
-def test_a_repaired_model_is_a_model_like_any_other(leg, series, tmp_path, kind):
+def test_a_repaired_model_is_a_model_like_any_other(laboratory, leg, series, tmp_path, kind):
     effect, close = KINDS[kind]
-    recording = simulate(leg, series[0], periods=12, seed=70, effects=[effect]).recording
+    recording = recorded(laboratory, kind)
     found = diagnosed(identified(leg, recording), recording)
     assert (effect.effect.name, "knee" if kind != "column" else "hip") in [(m.effect, m.joint) for m in found.missing]
     found.model.save(tmp_path / "repaired.json")
@@ -83,9 +89,9 @@ def test_what_drifts_is_named_and_is_no_part_of_the_model(leg, series):
     assert "friction_drift" not in [effect.name for effect in found.model.effects]
 
 
-def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(leg, series):
+def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(laboratory, leg):
     effect, _ = KINDS["link"]
-    recording = simulate(leg, series[0], periods=12, seed=70, effects=[effect]).recording
+    recording = recorded(laboratory, "link")
     effects = (*base_effects(leg), effect.effect)
     from_sum = identified(leg, recording, effects=effects)
     bench = Bench(period_data(wide_processing(recording, leg, PERIOD), leg), (*effects, *spring_effects(leg)))
