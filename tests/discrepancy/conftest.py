@@ -1,7 +1,7 @@
 """A leg, a short motion of it and what its sensors see: shared by the tests of the parts of a diagnosis."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.motion import FourierSeries
+from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation import FrictionJitter, PlantedEffect, Settling, simulate
 
@@ -21,10 +22,15 @@ PERIOD = 5.0
 
 @dataclass(frozen=True)
 class Laboratory:
-    """Records short experiments with the leg and puts them on the bench."""
+    """Records short experiments with the leg, each once, and puts them on the bench.
+
+    A recording follows from what it is asked with, to the last bit, and is read-only: tests share it. Each takes about
+    a megabyte.
+    """
 
     leg: Robot
     motions: tuple[object, ...]
+    _recordings: dict[object, Recording] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def effects(self):
@@ -33,11 +39,22 @@ class Laboratory:
 
     def record(self, planted=(), *, periods=8, seed=3, motion=0, **options):
         """A recording with some effects in the leg, each `(name, joint, values, shape)` or an effect with values."""
-        found = []
-        for item in planted:
-            effect = item[0] if not isinstance(item[0], str) else make_effect(item[0], item[1], **item[3])
-            values = item[1] if not isinstance(item[0], str) else item[2]
-            found.append(PlantedEffect(effect, np.asarray(values, dtype=float)))
+        planted = tuple(
+            (item[0], item[1]) if not isinstance(item[0], str) else (make_effect(item[0], item[1], **item[3]), item[2])
+            for item in planted
+        )
+        if "plant" in options:  # its arrays have no key
+            return self.recorded_anew(planted, periods=periods, seed=seed, motion=motion, **options)
+        # effects are equal where their kinds, joints and shapes are
+        amounts = tuple((effect, tuple(map(float, values))) for effect, values in planted)
+        key = (amounts, periods, seed, motion, tuple(sorted(options.items())))
+        if key not in self._recordings:
+            self._recordings[key] = self.recorded_anew(planted, periods=periods, seed=seed, motion=motion, **options)
+        return self._recordings[key]
+
+    def recorded_anew(self, planted, *, periods, seed=3, motion=0, **options):
+        """The same, whatever was recorded before: for a plant of its own, or where a test changes what acts."""
+        found = [PlantedEffect(effect, np.asarray(values, dtype=float)) for effect, values in planted]
         # two periods of 5 s: the third changes by 1e-8 rad
         options = {"settling": Settling(1e-4), **options}
         return simulate(self.leg, self.motions[motion], periods=periods, seed=seed, effects=found, **options).recording

@@ -126,7 +126,8 @@ def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch
         return effect.reference + 15.0 * np.sin(np.pi * time / 60.0)
 
     monkeypatch.setattr(TemperatureFriction, "temperature", rise_and_fall)
-    recording = laboratory.record([("temperature_friction", "knee", [0.0, -0.05], {})], periods=12)
+    effect = make_effect("temperature_friction", "knee")
+    recording = laboratory.recorded_anew([(effect, [0.0, -0.05])], periods=12)
     bench = laboratory.bench(recording)
     now = settle(bench, bench.effects)
     (trend,) = compare_periods(bench, now.fit, check.temperatures(recording, bench.data)).trends
