@@ -74,22 +74,21 @@ def places(record, path=()):
 
 
 def changed(record, place, change, junk):
-    """A copy with one place replaced, removed, doubled or renamed."""
+    """A copy with one place replaced, removed, doubled or renamed; what is not on the way there is shared."""
     if not place:
         return junk
-    whole = copy.deepcopy(record)
-    holder = whole
-    for key in place[:-1]:
-        holder = holder[key]
-    key = place[-1]
-    if change == "replace":
-        holder[key] = junk
+    key, *rest = place
+    whole = copy.copy(record)
+    if rest:
+        whole[key] = changed(record[key], rest, change, junk)
+    elif change == "replace":
+        whole[key] = junk
     elif change == "remove":
-        del holder[key]
-    elif isinstance(holder, list):
-        holder.append(copy.deepcopy(holder[key]))
+        del whole[key]
+    elif isinstance(whole, list):
+        whole.append(whole[key])
     else:
-        holder[f"{key}_"] = holder.pop(key)
+        whole[f"{key}_"] = whole.pop(key)
     return whole
 
 
