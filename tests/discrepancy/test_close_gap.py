@@ -14,7 +14,7 @@ from sea_ident.discrepancy.forward import command_of, simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, read_model
 from sea_ident.exceptions import SeaIdentWarning
-from sea_ident.simulation import PlantedEffect, VelocityController, simulate
+from sea_ident.simulation import PlantedEffect, VelocityController
 
 PERIOD = 5.0
 NOTHING_LACKS = LackOfFit(0.0, 1, 1.0, 1.0, {})
@@ -30,17 +30,9 @@ def planted():
 
 
 @pytest.fixture(scope="module")
-def recordings(leg):
-    return [
-        simulate(
-            leg,
-            sea_ident.design_excitation(leg, base_frequency=1 / PERIOD, harmonics=5, starts=1, seed=seed),
-            periods=12,
-            seed=40 + seed,
-            effects=planted(),
-        ).recording
-        for seed in (0, 1)
-    ]
+def recordings(laboratory):
+    pairs = [(p.effect, p.values) for p in planted()]
+    return [laboratory.record(pairs, periods=10, seed=seed, motion=motion) for motion, seed in ((0, 3), (1, 9))]
 
 
 @pytest.fixture(scope="module")
