@@ -29,16 +29,30 @@ def stribeck(leg, series):
 
 
 @pytest.fixture(scope="module")
-def found(leg, stribeck):
+def intact_model(leg, intact):
+    return sea_ident.identify(leg, intact[0], period=5.0)
+
+
+@pytest.fixture(scope="module")
+def stribeck_model(leg, stribeck):
+    return sea_ident.identify(leg, stribeck[0], period=5.0)
+
+
+@pytest.fixture(scope="module")
+def closed(stribeck, stribeck_model):
     training, holdout = stribeck
-    model = sea_ident.identify(leg, training, period=5.0)
-    return sea_ident.diagnose(model, training, holdout=holdout)
+    return sea_ident.close_gap(stribeck_model, training, holdout=holdout)
 
 
-def test_nothing_is_named_where_nothing_is_missing(leg, intact):
+@pytest.fixture(scope="module")
+def found(closed):
+    """What `diagnose` says of the model as it was given: the first round of closing the gap is that."""
+    return closed.rounds[0]
+
+
+def test_nothing_is_named_where_nothing_is_missing(intact, intact_model):
     training, holdout = intact
-    model = sea_ident.identify(leg, training, period=5.0)
-    diagnosis = sea_ident.diagnose(model, training, holdout=holdout)
+    diagnosis = sea_ident.diagnose(intact_model, training, holdout=holdout)
     assert diagnosis.verdict == "none"
     assert not diagnosis.missing
 
@@ -68,32 +82,27 @@ def test_what_is_written_is_read_back(found, tmp_path):
     assert all(np.isfinite(p["value"]) for m in record["missing"] for p in m["parameters"])
 
 
-def test_the_same_file_twice_proves_nothing(leg, intact):
+def test_the_same_file_twice_proves_nothing(intact, intact_model):
     training, _ = intact
-    model = sea_ident.identify(leg, training, period=5.0)
     with pytest.raises(DiagnosisError, match="proves nothing"):
-        sea_ident.diagnose(model, training, holdout=training)
+        sea_ident.diagnose(intact_model, training, holdout=training)
 
 
-def test_a_recording_of_another_robot_is_refused(leg, intact):
+def test_a_recording_of_another_robot_is_refused(intact, intact_model):
     training, holdout = intact
-    model = sea_ident.identify(leg, training, period=5.0)
     renamed = {name.replace("_knee", "_elbow"): values for name, values in holdout.columns.items()}
     other = type(holdout)(holdout.time, renamed, "another robot")
     with pytest.raises(DiagnosisError, match="another robot"):
-        sea_ident.diagnose(model, training, holdout=other)
+        sea_ident.diagnose(intact_model, training, holdout=other)
 
 
-def test_the_gap_is_closed_and_the_history_kept(leg, stribeck):
-    training, holdout = stribeck
-    model = sea_ident.identify(leg, training, period=5.0)
-    closed = sea_ident.close_gap(model, training, holdout=holdout)
+def test_the_gap_is_closed_and_the_history_kept(stribeck, stribeck_model, closed):
     assert closed.verdict == "none"
     assert closed.added == (("stribeck_friction", "knee"),)
     assert closed.rounds[0].verdict in ("named", "named_with_remainder")
     names = {column.name for column in closed.model.base.columns}
     assert "knee.stribeck_friction" in names
-    before, after = (float(sea_ident.validate(m, holdout).rms[1]) for m in (model, closed.model))
+    before, after = (float(sea_ident.validate(m, stribeck[1]).rms[1]) for m in (stribeck_model, closed.model))
     assert after < 0.8 * before
 
 
