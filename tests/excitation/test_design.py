@@ -39,6 +39,12 @@ def designed(exo):
     return design_excitation(exo, starts=3, seed=1)
 
 
+@pytest.fixture(scope="module")
+def plain(exo):
+    """A small design that others are compared with."""
+    return design_excitation(exo, seed=0, **SMALL)
+
+
 def violations(robot, series, points):
     """Largest excess over every linear limit on a grid, as a part of its range."""
     limits = linear_limits(robot, robot.limits)
@@ -149,7 +155,7 @@ def test_every_criterion_is_best_in_its_own_sense(exo):
     np.testing.assert_array_equal(np.argmax(mean, axis=1), np.arange(4))
 
 
-def test_what_is_raised_is_told_and_an_interrupted_design_is_of_its_criterion(exo):
+def test_what_is_raised_is_told_and_an_interrupted_design_is_of_its_criterion(exo, plain):
     """Every design begins with log det; what it then reports is its own criterion, however early it was stopped."""
     told: list[str] = []
 
@@ -173,9 +179,8 @@ def test_what_is_raised_is_told_and_an_interrupted_design_is_of_its_criterion(ex
         assert all(margin >= 0.0 for margin in found.margins.values())
         values.append(found.value)
     # one that was stopped once the D-optimal one was there is no worse than that
-    widest = design_excitation(exo, seed=0, jobs=1, **SMALL)
     model, _ = design_model(exo, reduced_effects(exo), DOptimality(), None)
-    rows = model.columns.at(widest.series.sample(50.0)).columns()
+    rows = model.columns.at(plain.series.sample(50.0)).columns()
     least = EOptimality().reported(np.einsum("rpn,rsn->ps", rows, rows))
     assert min(values[1:]) >= least - 1e-9
     assert complete.value >= max(values) - 1e-9
@@ -193,10 +198,9 @@ def test_other_processes_find_the_same(exo, backend):
     assert apart.start_values == alone.start_values
 
 
-def test_given_start_inside_is_never_made_worse(exo):
-    good = design_excitation(exo, seed=0, **SMALL)
-    again = design_excitation(exo, seed=99, start=good.series.coefficients, harmonics=4, starts=1, rate=50.0)
-    assert again.log_det >= good.log_det - 0.05
+def test_given_start_inside_is_never_made_worse(exo, plain):
+    again = design_excitation(exo, seed=99, start=plain.series.coefficients, harmonics=4, starts=1, rate=50.0)
+    assert again.log_det >= plain.log_det - 0.05
     assert len(again.start_values) == 2
 
 
@@ -209,8 +213,7 @@ def test_given_start_outside_is_moved_inside_and_said(exo):
     assert any("moved inside" in text for text in found.warnings)
 
 
-def test_information_that_is_there_already_turns_the_design_to_what_is_missing(exo):
-    plain = design_excitation(exo, seed=0, **SMALL)
+def test_information_that_is_there_already_turns_the_design_to_what_is_missing(exo, plain):
     model, _ = design_model(exo, reduced_effects(exo), DOptimality(), None)
     rows = model.columns.at(plain.series.sample(50.0)).columns()
     own = np.einsum("rpn,rsn->ps", rows, rows)
@@ -224,9 +227,8 @@ def test_information_that_is_there_already_turns_the_design_to_what_is_missing(e
     assert sequential.log_det == pytest.approx(np.linalg.slogdet(known + new)[1], abs=1e-6)
 
 
-def test_noise_weights_count(exo):
+def test_noise_weights_count(exo, plain):
     """Twice the noise is a quarter of the information about each parameter; one noisy joint counts less."""
-    plain = design_excitation(exo, seed=0, **SMALL)
     double = design_excitation(exo, seed=0, noise=np.full(3, 2.0), **SMALL)
     assert double.log_det == pytest.approx(plain.log_det - 15.0 * np.log(4.0), abs=1e-3)
     noise = np.array([1.0, 1.0, 100.0])
@@ -241,13 +243,12 @@ def test_noise_weights_count(exo):
     assert value(noisy) >= value(plain) - 0.3
 
 
-def test_spring_columns_gain_from_a_design_that_includes_them(exo):
+def test_spring_columns_gain_from_a_design_that_includes_them(exo, plain):
     """The ankle of the paper: its spring is hardly loaded by a design for the rigid model."""
     effects = (*base_effects(exo), *spring_effects(exo))
     model, _ = design_model(exo, effects, DOptimality(), PredictedMotors())
     with_springs = design_excitation(exo, seed=0, effects=effects, motors=PredictedMotors(), **SMALL)
     assert len(with_springs.parameters) == 16 + 9
-    without = design_excitation(exo, seed=0, **SMALL)
     from sea_ident.excitation.states import Sampling
 
     def spring_information(excitation):
@@ -257,15 +258,14 @@ def test_spring_columns_gain_from_a_design_that_includes_them(exo):
         ankle = [k for k, name in enumerate(model.names) if name.startswith("ankle.spring")]
         return -np.linalg.slogdet(covariance[np.ix_(ankle, ankle)])[1]
 
-    assert spring_information(with_springs) > spring_information(without) + 0.1
+    assert spring_information(with_springs) > spring_information(plain) + 0.1
 
 
-def test_discrimination_raises_what_tells_two_effects_apart(exo):
+def test_discrimination_raises_what_tells_two_effects_apart(exo, plain):
     target, other = make_effect("stribeck_friction", "knee"), make_effect("nonlinear_viscous_friction", "knee")
     criterion = Discrimination(target, (other,))
     found = design_excitation(exo, seed=0, criterion=criterion, harmonics=4, starts=4, rate=50.0)
     assert found.criterion == "discrimination of knee.stribeck_friction from knee.nonlinear_viscous_friction"
-    plain = design_excitation(exo, seed=0, **SMALL)
 
     def left(excitation):
         motion = excitation.series.sample(50.0)
