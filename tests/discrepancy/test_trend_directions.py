@@ -14,9 +14,15 @@ from sea_ident.effects import make_effect
 
 
 @pytest.fixture(scope="module")
-def softening(laboratory):
-    """A leg whose hip spring loses a third of its stiffness within a minute."""
-    bench = laboratory.bench(laboratory.record([("stiffness_drift", "hip", [-150.0], {})], periods=12))
+def recording(laboratory):
+    """A leg whose hip spring loses a third of its stiffness within a minute, and whose knee gets warm to no effect."""
+    warm = ("temperature_friction", "knee", [0.0, 0.0], {"time_constant": 24.0})
+    return laboratory.record([("stiffness_drift", "hip", [-150.0], {}), warm])
+
+
+@pytest.fixture(scope="module")
+def softening(laboratory, recording):
+    bench = laboratory.bench(recording)
     return bench, settle(bench, bench.effects).fit
 
 
@@ -45,9 +51,8 @@ def test_a_torque_constant_drifts_by_the_torque_that_was_measured(softening):
     assert np.all(rows.link == 0.0)
 
 
-def test_periods_left_out_keep_their_places(laboratory):
+def test_periods_left_out_keep_their_places(laboratory, recording):
     """Of the last periods but one, at their times, with their temperatures."""
-    recording = laboratory.record([("temperature_friction", "knee", [0.0, 0.0], {"time_constant": 24.0})], periods=8)
     whole = laboratory.data(recording)
     data = check.subset(whole, [1, 2, 4, 7])
     assert data.starts == pytest.approx(np.array([1, 2, 4, 7]) * 5.0 + whole.starts[0])
