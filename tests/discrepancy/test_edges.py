@@ -7,17 +7,14 @@ import pytest
 
 from sea_ident.discrepancy import edges
 from sea_ident.discrepancy.assess import rivals
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import simplest_first
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle
-from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.effects import make_effect
 from sea_ident.effects.external_force import POINT
-from sea_ident.simulation import PlantedEffect, simulate
 
 PERIOD = 5.0
 START, STOP = 4.13, 0.62
@@ -25,11 +22,9 @@ START, STOP = 4.13, 0.62
 
 
 @pytest.fixture(scope="module")
-def pushed(leg, series):
+def pushed(laboratory):
     push = make_effect("external_force", "knee", start=START, stop=STOP, period=PERIOD)
-    found = simulate(leg, series[0], periods=8, seed=3, effects=(PlantedEffect(push, np.array([4.0, 0.0, 2.0])),))
-    data = period_data(wide_processing(found.recording, leg, PERIOD), leg)
-    bench = Bench(data, (*base_effects(leg), *spring_effects(leg)))
+    bench = laboratory.bench(laboratory.record([(push, [4.0, 0.0, 2.0])]))
     return bench, settle(bench, bench.effects)
 
 

@@ -8,14 +8,13 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, spectrum, wide_processing
 from sea_ident.discrepancy.diagnose import model_effects
 from sea_ident.discrepancy.settle import settle
-from sea_ident.simulation import simulate
 
 PERIOD = 5.0
 
 
 @pytest.fixture(scope="module")
-def settled(leg, series):
-    recording = simulate(leg, series[0], periods=6, seed=3).recording
+def settled(laboratory, leg):
+    recording = laboratory.record()
     model = sea_ident.identify(leg, recording, period=PERIOD)
     bench = Bench(period_data(wide_processing(recording, leg, PERIOD), leg), model_effects(model))
     return bench, settle(bench, bench.effects)
