@@ -63,6 +63,7 @@ class JointAction:
         shares: of its torque in the link row and in the motor row, with their signs [-].
         columns: (N, k) columns from N states of the joint (`SimulationState.at`).
         values: (k,) values of its parameters.
+        of_speed: whether its torque depends on a speed; one that does not damps nothing, and is not asked for slopes.
     """
 
     def __init__(
@@ -71,8 +72,10 @@ class JointAction:
         shares: tuple[float, float],
         columns: Callable[[SimulationState], FloatArray],
         values: FloatArray,
+        *,
+        of_speed: bool = True,
     ) -> None:
-        self.index, (self.on_link, self.on_motor) = index, shares
+        self.index, (self.on_link, self.on_motor), self.of_speed = index, shares, of_speed
         self._columns, self._values = columns, np.asarray(values, dtype=np.float64)
 
     def amounts(self, state: SimulationState) -> FloatArray:

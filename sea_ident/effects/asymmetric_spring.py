@@ -40,6 +40,7 @@ class AsymmetricSpring(SpringEffect):
         Shape("exponent", "-", 1.0, 3.0, logarithmic=False, points=3),
         Shape("kink", "rad", -0.2, 0.2, logarithmic=False),
     )
+    depends_on: ClassVar[tuple[str, ...]] = ("q", "theta")
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""

@@ -50,6 +50,7 @@ class Backlash(SpringEffect):
         Shape("half_width", "rad", 1e-5, 0.5),
         Shape("softness", "-", 0.01, 1.5),
     )
+    depends_on: ClassVar[tuple[str, ...]] = ("q", "theta")
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""

@@ -270,7 +270,13 @@ class JointEffect(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The columns at the present state, times the values."""
-        return JointAction(robot.index(self.required_joint), self.side.shares, self.present_columns, values)
+        at, shares = robot.index(self.required_joint), self.side.shares
+        return JointAction(at, shares, self.present_columns, values, of_speed=self.of_speed)
+
+    @property
+    def of_speed(self) -> bool:
+        """Whether its columns depend on a speed."""
+        return not {"dq", "dtheta"}.isdisjoint(self.depends_on)
 
     def present_columns(self, state: SimulationState) -> FloatArray:
         """(N, k) columns in N states of the joint at one time of a simulation."""

@@ -91,7 +91,8 @@ class MemoryAction(JointAction):
     """
 
     def __init__(self, effect: MemoryEffect, robot: Robot, values: FloatArray) -> None:
-        super().__init__(robot.index(effect.required_joint), effect.side.shares, self._remembered, values)
+        at, shares = robot.index(effect.required_joint), effect.side.shares
+        super().__init__(at, shares, self._remembered, values, of_speed=effect.of_speed)
         self._effect = effect
         self._memory: tuple[float, ...] = (0.0,) * effect.memory_size
         self._position: float | None = None

@@ -18,6 +18,7 @@ class ParallelSpring(JointEffect):
     name: ClassVar[str] = "parallel_spring"
     side: ClassVar[Side] = Side.LINK
     source: ClassVar[str] = "Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, section 9.3"
+    depends_on: ClassVar[tuple[str, ...]] = ("q",)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """Stiffness, and torque at q = 0."""

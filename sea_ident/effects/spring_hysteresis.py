@@ -34,6 +34,7 @@ class SpringHysteresis(OneWayEffect):
     source: ClassVar[str] = "Iwan, A distributed-element model for hysteresis, J. Applied Mechanics 33, 1966"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("slip", "rad", 1e-5, 0.5),)
     memory_size: ClassVar[int] = 2
+    depends_on: ClassVar[tuple[str, ...]] = ("q", "theta")
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple["SpringHysteresis", ...]:

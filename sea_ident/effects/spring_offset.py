@@ -17,6 +17,7 @@ class SpringOffset(SpringEffect):
 
     name: ClassVar[str] = "spring_offset"
     source: ClassVar[str] = "HEBI Robotics, X-series documentation, spring zero"
+    depends_on: ClassVar[tuple[str, ...]] = ()
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""

@@ -25,6 +25,7 @@ class StiffnessDrift(DriftEffect):
         "Flacco, De Luca, Residual-based stiffness estimation in robots with flexible transmissions, 2011"
     )
     shapes: ClassVar[tuple[Shape, ...]] = DriftEffect.shapes
+    depends_on: ClassVar[tuple[str, ...]] = ("q", "theta")
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:

@@ -62,4 +62,4 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
         def columns(state: SimulationState) -> FloatArray:
             return (state.tau_motor * warming(np.array(state.time), self.time_constant))[:, None]
 
-        return JointAction(robot.index(self.at), self.side.shares, columns, values)
+        return JointAction(robot.index(self.at), self.side.shares, columns, values, of_speed=False)

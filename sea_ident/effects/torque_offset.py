@@ -18,6 +18,7 @@ class TorqueOffset(JointEffect):
     name: ClassVar[str] = "torque_offset"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Janot, Gautier, Brunot, EMPS benchmark, 2019"
+    depends_on: ClassVar[tuple[str, ...]] = ()
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""

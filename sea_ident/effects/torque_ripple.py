@@ -33,6 +33,7 @@ class TorqueRipple(JointEffect):
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Ghorbel, Gandhi, Alpeter, On the kinematic error in harmonic drive gears, 2001"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 2000.0),)
+    depends_on: ClassVar[tuple[str, ...]] = ("theta",)
 
     def __post_init__(self) -> None:
         """Refuse a number that is none."""

@@ -87,4 +87,6 @@ class TorqueSaturation(LoadEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The power of the commanded torque."""
-        return JointAction(robot.index(self.at), self.side.shares, lambda state: self._power(state.tau_motor), values)
+        return JointAction(
+            robot.index(self.at), self.side.shares, lambda state: self._power(state.tau_motor), values, of_speed=False
+        )

@@ -67,6 +67,7 @@ class PlantedTorques:
         # Springs first: the others may depend on the torque that they transmit.
         self._joint_springs, self._springs = _by_kind([hook for spring, hook in hooks if spring], coordinates)
         self._joint_others, self._others = _by_kind([hook for spring, hook in hooks if not spring], coordinates)
+        self._damping = [at for at in (*self._joint_springs, *self._joint_others) if at.action.of_speed]
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
         self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
@@ -145,9 +146,10 @@ class PlantedTorques:
     ) -> None:
         """Add the slopes of the torques over the speeds, one side at a time, where they damp."""
         slopes = [0.0] * self._size
-        instant = _Instant(max(time, self._begin), u.tolist(), w.tolist(), tau_motor, tau_spring)
-        for at in (*self._joint_springs, *self._joint_others):
-            at.add_slopes(instant, slopes)
+        if self._damping:
+            instant = _Instant(max(time, self._begin), u.tolist(), w.tolist(), tau_motor, tau_spring)
+            for at in self._damping:
+                at.add_slopes(instant, slopes)
         if self._springs or self._others:
             n = len(self._link)
             self._set(time, 0.0, u, w, tau_motor, tau_spring)

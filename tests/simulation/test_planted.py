@@ -191,6 +191,47 @@ def test_slopes_over_the_speeds_are_those_of_what_damps(leg, name, values, expec
     np.testing.assert_allclose(np.array(damping) - 0.5, added, atol=1e-9)
 
 
+@dataclass(frozen=True)
+class Sloped(Told):
+    """An effect of no speed that is asked for its slopes all the same."""
+
+    def torque(self, robot, values):
+        action = self.of.torque(robot, values)
+        assert not action.of_speed
+        action.of_speed = True
+        return action
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("torque_offset", [0.7]),
+        ("torque_ripple", [2.0, -1.0]),
+        ("parallel_spring", [5.0, 0.4]),
+        ("spring_offset", [0.5]),
+        ("asymmetric_spring", [40.0]),
+        ("backlash", [60.0]),
+        ("spring_hysteresis", [0.8, 0.6]),
+        ("stiffness_drift", [50.0]),
+        ("torque_saturation", [1e-4]),
+        ("torque_constant_drift", [0.2]),
+    ],
+)
+def test_slopes_of_what_depends_on_no_speed_change_no_bit(leg, leg_series, quiet, exact, name, values):
+    effect = make_effect(name, "knee")
+    runs = [
+        simulate(
+            leg, leg_series, periods=1, effects=[PlantedEffect(each, np.array(values))], start=exact.motion, **quiet
+        ).recording
+        for each in (effect, Sloped("knee", effect))
+    ]
+    assert runs[0].columns.keys() == runs[1].columns.keys()
+    for column, signal in runs[0].columns.items():
+        np.testing.assert_array_equal(signal, runs[1].columns[column], column)
+    without = exact.recording.columns["q_knee"][: runs[0].samples]
+    assert not np.array_equal(runs[0].columns["q_knee"], without)
+
+
 def test_slopes_of_a_rigid_joint_are_at_its_only_coordinate():
     robot = ur10()
     planted = PlantedEffect(make_effect("viscous_friction", "elbow_joint"), np.array([0.7]))
