@@ -73,14 +73,18 @@ def test_what_is_far_above_what_is_of_interest_is_not_begun_again(laboratory, mo
     assert from_described_springs(bench, wrong, position, start.noise, parameters, wrong.statistic / 100.0) is wrong
 
 
+ERRORS = [*LARGE.items(), ("position_delay", {"delay": 0.005})]
+JOINTS = ["hip", "knee", "ankle"]
+EVERYWHERE = [
+    pytest.param(effect, shape, joint, (k // 2 + i + 1) % 2, id="-".join([effect, *map(str, shape.values()), joint]))
+    for k, (effect, shape) in enumerate(ERRORS)
+    for i, joint in enumerate(JOINTS)
+]
+"""Every error at every joint, each error and each joint on either motion, and none that another test searches for."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("motion", [0, 1])
-@pytest.mark.parametrize("joint", ["hip", "knee", "ankle"])
-@pytest.mark.parametrize(
-    ("effect", "shape"),
-    [*LARGE.items(), ("position_delay", {"delay": 0.005})],
-    ids=["eccentricity", "offset", "delay", "short delay"],
-)
+@pytest.mark.parametrize(("effect", "shape", "joint", "motion"), EVERYWHERE)
 def test_large_errors_of_encoders_are_found_at_every_joint(laboratory, effect, shape, joint, motion):
     """Alone, of all that is as good the simplest, with its value: a wrong zero of the last encoder is as good as a
     spring with hysteresis that never turns back."""
