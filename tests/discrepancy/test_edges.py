@@ -24,7 +24,7 @@ START, STOP = 4.13, 0.62
 @pytest.fixture(scope="module")
 def pushed(laboratory):
     push = make_effect("external_force", "knee", start=START, stop=STOP, period=PERIOD)
-    bench = laboratory.bench(laboratory.record([(push, [4.0, 0.0, 2.0])]))
+    bench = laboratory.bench(laboratory.record([(push, [4.0, 0.0, 2.0])], periods=5))
     return bench, settle(bench, bench.effects)
 
 
@@ -97,7 +97,7 @@ def test_the_best_window_is_the_one_that_fits_best(pushed):
 def pushed_thigh(laboratory):
     """A push on the centre of mass of the thigh, and one on the shank in its place."""
     push = make_effect("external_force", "hip", start=START, stop=STOP, period=PERIOD)
-    bench = laboratory.bench(laboratory.record([(push, np.array([8.0, 0.0, 4.0]))]))
+    bench = laboratory.bench(laboratory.record([(push, np.array([8.0, 0.0, 4.0]))], periods=5))
     now = settle(bench, bench.effects)
     coarse = {"start": START + 0.05, "stop": STOP - 0.05, "period": PERIOD}
     candidates = {joint: make_effect("external_force", joint, **coarse) for joint in ("hip", "knee")}

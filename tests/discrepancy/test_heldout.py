@@ -19,7 +19,7 @@ def ripple(rippled):
 
 @pytest.fixture(scope="module")
 def with_ripple(laboratory):
-    return laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], motion=1, seed=8)
+    return laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, motion=1, seed=8)
 
 
 def test_every_other_period_is_held_out(ripple):
@@ -123,12 +123,12 @@ def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
 
 def test_an_effect_that_is_not_there_does_not_hold(laboratory, ripple):
     """The other motion was recorded without it: with its parameters as they are, it makes things worse."""
-    (transfer,) = held_out(*ripple, laboratory.record(motion=1, seed=8))[0].transfers
+    (transfer,) = held_out(*ripple, laboratory.record(periods=5, motion=1, seed=8))[0].transfers
     assert transfer.share < 0.1 or not transfer.tested
 
 
 def test_an_effect_of_the_opposite_sign_does_not_hold(laboratory, ripple):
-    turned = laboratory.record([("torque_ripple", "hip", [-1.0, -0.5], {"order": 4.0})], motion=1, seed=8)
+    turned = laboratory.record([("torque_ripple", "hip", [-1.0, -0.5], {"order": 4.0})], periods=5, motion=1, seed=8)
     (transfer,) = held_out(*ripple, turned)[0].transfers
     assert transfer.tested
     assert transfer.share == pytest.approx(-3.0, abs=0.5)  # 1 - (2 a)^2 / a^2
@@ -141,7 +141,9 @@ def test_nothing_was_added_and_nothing_is_held_out(nothing_missing):
 
 
 def test_five_periods_are_not_split(laboratory, ripple):
-    bench = laboratory.bench(laboratory.record(periods=5))
+    whole = laboratory.record()
+    bench = laboratory.bench(whole.crop(float(whole.time[0]), float(whole.time[0]) + 5 * 5.0))
+    assert bench.data.periods == 5
     now = settle(bench, bench.effects)
     assert other_periods(bench, Selection(now, now, 1, (1e-9,))) is None
 
