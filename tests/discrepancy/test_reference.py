@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ def payload(laboratory):
 
 
 @pytest.fixture(scope="module")
+def recorded(laboratory):
+    """Records six periods, of the leg as it is unless something is planted."""
+    return partial(laboratory.record, periods=6)
+
+
+@pytest.fixture(scope="module")
 def compared(laboratory, leg):
     """Compares a recording with the model of another, of usual effects unless others are given."""
 
@@ -40,23 +47,20 @@ def compared(laboratory, leg):
 
 
 @pytest.mark.parametrize("pairs", [range(4), pytest.param(range(4, 12), marks=pytest.mark.slow)], ids=["few", "more"])
-def test_nothing_changed_at_the_level_that_is_said(laboratory, compared, pairs):
+def test_nothing_changed_at_the_level_that_is_said(recorded, compared, pairs):
     """Over two motions and pairs of recordings; p-values that are too small would show."""
-    found = [
-        compared(laboratory.record(seed=2 * k, motion=k % 2), laboratory.record(seed=2 * k + 1, motion=0))
-        for k in pairs
-    ]
+    found = [compared(recorded(seed=2 * k, motion=k % 2), recorded(seed=2 * k + 1, motion=0)) for k in pairs]
     p_values = np.array([each.p_value for each in found])
     assert stats.binomtest(int(np.sum(p_values < 0.05)), len(found), 0.05, "greater").pvalue > 0.01
     assert p_values.min() > LEVEL
     assert not any(each.changed or each.missing for each in found)
 
 
-def test_both_models_have_the_effects_and_shapes_of_the_earlier_one(laboratory, leg, compared):
+def test_both_models_have_the_effects_and_shapes_of_the_earlier_one(recorded, leg, compared):
     """What one of them lacked would bend its parameters, by another motion in another way, and count as a change."""
     ripple = make_effect("torque_ripple", "hip", order=4.0)
     recordings = [
-        laboratory.record([("torque_ripple", "hip", [2.0, 1.0], {"order": 4.0})], motion=motion, seed=seed)
+        recorded([("torque_ripple", "hip", [2.0, 1.0], {"order": 4.0})], motion=motion, seed=seed)
         for motion, seed in ((1, 3), (0, 11))
     ]
     found = compared(*recordings, effects=(*base_effects(leg), ripple))
@@ -78,8 +82,8 @@ def test_a_change_too_small_to_matter_is_none_however_sure_it_is(laboratory, com
 
 
 @pytest.mark.parametrize("motion", [0, 1])
-def test_a_payload_is_found_within_its_uncertainty_and_alone(laboratory, compared, motion):
-    found = compared(laboratory.record([payload(laboratory)], motion=motion), laboratory.record(seed=11))
+def test_a_payload_is_found_within_its_uncertainty_and_alone(laboratory, recorded, compared, motion):
+    found = compared(recorded([payload(laboratory)], motion=motion), recorded(seed=11))
     assert [(m.effect, m.joint) for m in found.missing] == [("payload", "ankle")]
     mass = found.missing[0].parameters[0]
     assert mass.unit == "kg"
@@ -87,9 +91,9 @@ def test_a_payload_is_found_within_its_uncertainty_and_alone(laboratory, compare
     assert mass.std < 0.05
 
 
-def test_two_changes_are_told_apart_each_with_its_own_torque(laboratory, compared):
+def test_two_changes_are_told_apart_each_with_its_own_torque(laboratory, recorded, compared):
     rubbed = ("coulomb_friction", "knee", [1.0], {})
-    found = compared(laboratory.record([payload(laboratory), rubbed]), laboratory.record(seed=11))
+    found = compared(recorded([payload(laboratory), rubbed]), recorded(seed=11))
     by_name = {(m.effect, m.joint): m for m in found.missing}
     assert set(by_name) == {("payload", "ankle"), ("coulomb_friction", "knee")}
     friction = by_name["coulomb_friction", "knee"]
@@ -97,10 +101,10 @@ def test_two_changes_are_told_apart_each_with_its_own_torque(laboratory, compare
     assert friction.torque_share != by_name["payload", "ankle"].torque_share
 
 
-def test_all_torque_constants_have_the_share_of_torque_that_they_changed_by(laboratory, compared):
-    recording = laboratory.record()
+def test_all_torque_constants_have_the_share_of_torque_that_they_changed_by(recorded, compared):
+    recording = recorded()
     columns = {name: 1.03 * v if name.startswith("current_") else v for name, v in recording.columns.items()}
-    found = compared(replace(recording, columns=columns), laboratory.record(seed=11))
+    found = compared(replace(recording, columns=columns), recorded(seed=11))
     assert [(m.effect, m.joint) for m in found.missing] == [("torque_constant", None)]
     change = found.missing[0].parameters[0]
     assert abs(change.value - 0.03) < 4.0 * change.std
