@@ -28,7 +28,7 @@ def upright(laboratory, series):
 def recorded(upright, value, motion, joint=JOINT, amounts=AMOUNTS, slip=SLIP):
     """A spring with dry friction, and a constant torque."""
     planted = [("spring_hysteresis", joint, amounts, {"slip": slip}), ("spring_offset", joint, [value], {})]
-    return upright.record(planted, periods=12, motion=motion, seed=5 + motion)
+    return upright.record(planted, periods=10, motion=motion, seed=5 + motion)
 
 
 @pytest.fixture(scope="module")
