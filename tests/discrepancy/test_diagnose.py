@@ -6,26 +6,21 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError
-from sea_ident.simulation import PlantedEffect, simulate
 
 
-def recorded(leg, series, planted, seed):
-    return [
-        simulate(leg, motion, periods=12, seed=seed + k, effects=planted).recording for k, motion in enumerate(series)
-    ]
+def recorded(laboratory, planted, seed):
+    return [laboratory.record(planted, periods=12, seed=seed + motion, motion=motion) for motion in (0, 1)]
 
 
 @pytest.fixture(scope="module")
-def intact(leg, series):
-    return recorded(leg, series, (), 100)
+def intact(laboratory):
+    return recorded(laboratory, (), 100)
 
 
 @pytest.fixture(scope="module")
-def stribeck(leg, series):
-    effect = make_effect("stribeck_friction", "knee", speed=0.1)
-    return recorded(leg, series, (PlantedEffect(effect, np.array([1.0])),), 200)
+def stribeck(laboratory):
+    return recorded(laboratory, [("stribeck_friction", "knee", [1.0], {"speed": 0.1})], 200)
 
 
 @pytest.fixture(scope="module")

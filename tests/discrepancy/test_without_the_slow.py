@@ -12,15 +12,14 @@ from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
 from sea_ident.discrepancy.data import away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import settle
-from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.effects import base_effects, spring_effects
 from sea_ident.motion import FourierSeries
-from sea_ident.simulation import PlantedEffect, simulate
 
 PERIOD = 5.0
 
 
 @pytest.fixture(scope="module")
-def lingering(leg, series):
+def lingering(laboratory, leg, series):
     """A ripple at a hip that lingers twice in a period, and there a torque that no model has."""
     motion = series[0].sample(samples=1000)
     phase = 2 * np.pi * motion.time / PERIOD
@@ -29,8 +28,8 @@ def lingering(leg, series):
     q = motion.q.copy()
     q[:, 0] = 0.35 + 0.5 * (path - path.mean()) / np.ptp(path)
     slow = FourierSeries.fit(motion.time, q, 1 / PERIOD, 12)
-    ripple = PlantedEffect(make_effect("torque_ripple", "hip", order=19.0), np.array([0.45, 0.3]))
-    recording = simulate(leg, slow, periods=10, seed=5, effects=(ripple,)).recording
+    ripple = ("torque_ripple", "hip", [0.45, 0.3], {"order": 19.0})
+    recording = replace(laboratory, motions=(slow,)).record([ripple], periods=10, seed=5)
     data = period_data(wide_processing(recording, leg, PERIOD), leg)
     speed = data.motion.dtheta[:, 0]
     # known to its spread between the periods; up to four times that is left out anyway
