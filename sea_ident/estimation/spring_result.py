@@ -128,11 +128,14 @@ class SpringResult:
         )
 
     def doubt(self) -> str | None:
-        """A sentence where the law leaves more than noise; None where it does not."""
+        """A sentence where the law leaves more than noise; None where it does not.
+
+        The torque is that of the dynamic model: where this lacks something, the law cannot fit either.
+        """
         if not self.misfit or self.noise is None:
             return None
         return (
             f"spring of {self.joint}: its law leaves {self.rms_residual / max(self.noise, 1e-300):.2g} times the noise "
-            f"of its torque ({self.rms_residual:.3g} of {self.rms_torque:.3g}): it lacks something. Standard "
-            "deviations count this as random; diagnose tells what it is"
+            f"of its torque ({self.rms_residual:.3g} of {self.rms_torque:.3g}): it lacks something, or the dynamic model "
+            "that gives this torque does. Standard deviations count this as random; diagnose tells what it is"
         )

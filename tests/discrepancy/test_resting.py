@@ -118,7 +118,8 @@ def test_what_is_no_constant_of_that_spring_stays(upright, used, called_an_encod
 )
 def test_a_diagnosis_names_the_friction_and_says_where_it_rests(upright, joint, amounts, slip):
     here, there = (recorded(upright, value, k, joint, amounts, slip) for k, value in enumerate((HERE, THERE)))
-    model = sea_ident.identify(upright.leg, here)
+    with pytest.warns(SeaIdentWarning, match=f"spring of {joint}: its law leaves"):
+        model = sea_ident.identify(upright.leg, here)
     with pytest.warns(SeaIdentWarning, match="may rest anywhere") as warned:
         diagnosis = sea_ident.diagnose(model, here, holdout=there)
     assert diagnosis.verdict == "named"
