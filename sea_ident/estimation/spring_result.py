@@ -136,7 +136,7 @@ class SpringResult:
             return None
         times = self.rms_residual / max(self.noise, 1e-300)
         return (
-            f"spring of {self.joint}: its law leaves {times:.2g} times the noise of its torque ({self.rms_residual:.3g} "
-            f"of {self.rms_torque:.3g}): it lacks something, or the dynamic model that gives this torque "
-            "does. Standard deviations count this as random; diagnose tells what it is"
+            f"spring of {self.joint}: its law leaves {times:.2g} times the noise of its torque "
+            f"({self.rms_residual:.3g} of {self.rms_torque:.3g}): it lacks something, or the dynamic model that gives "
+            "this torque does. Standard deviations count this as random; diagnose tells what it is"
         )
