@@ -26,6 +26,7 @@ from sea_ident.discrepancy.judge import (
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL
 from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
+from sea_ident.discrepancy.powers import with_its_power
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
@@ -117,6 +118,8 @@ class _InPlace:
         bench, fit, noise, position = self.bench, self.now.fit, self.now.noise, self.position
         before, after, beat = fit.effects[:position], fit.effects[position + 1 :], fit.statistic + self.enough
         new = refitted(bench, before, candidate.effect, after, noise, fit.parameters, beat)
+        if new.statistic > beat:
+            new = with_its_power(bench, new, noise, position)
         if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
             return None
         if new.statistic - fit.statistic < self.enough and physical(bench, new, position):

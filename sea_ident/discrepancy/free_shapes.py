@@ -10,14 +10,14 @@ from sea_ident.effects import Effect, JointEffect, Shape
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring_stiffening import BESIDE_CUBIC, CUBIC, SpringStiffening
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
 
 SHAPES_THAT_STAY = {
-    "spring_stiffening": ("exponent",),
     "asymmetric_spring": ("kink",),
     "external_force": WHEN,
 }
-"""Shape parameters that are not refined: they say which effect it is, or come from elsewhere."""
+"""Shape parameters that are not refined: they come from elsewhere."""
 
 
 def is_signal(effect: Effect) -> bool:
@@ -70,8 +70,8 @@ def seen_by(effect: Effect, signals: tuple[Effect, ...]) -> tuple[Effect, ...]:
 def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
     """Shape parameters that a fit is free to change, and amounts of signal effects.
 
-    A push on the very centre of mass of a link stays there, a saturation by a cube one, and both sides of a spring with
-    a kink elsewhere than at rest straight.
+    A push on the very centre of mass of a link stays there, a saturation by a cube one, a spring that stiffens by the
+    power that a search tried, and both sides of a spring with a kink elsewhere than at rest straight.
     """
     found: list[tuple[int, Shape]] = []
     for position, effect in enumerate(effects):
@@ -79,6 +79,8 @@ def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
         if isinstance(effect, ExternalForce) and not any(getattr(effect, name) for name in POINT):
             stay = (*stay, *POINT)
         if isinstance(effect, TorqueSaturation) and effect.exponent == CUBE:
+            stay = (*stay, "exponent")
+        if isinstance(effect, SpringStiffening) and effect.exponent in (CUBIC, *BESIDE_CUBIC):
             stay = (*stay, "exponent")
         if isinstance(effect, AsymmetricSpring) and effect.kink != 0.0:
             stay = (*stay, "exponent")

@@ -1,4 +1,4 @@
-"""Saturation by another power than a cube, where the cube leaves too much.
+"""Saturation by another power than a cube, where the cube leaves too much, and springs that stiffen by another.
 
 The cube is the first term of any saturation that is the same both ways, and a power that is a little off does worse on
 larger torques than the cube does. So the power is found only where that takes away most of what the cube leaves. It is
@@ -8,8 +8,11 @@ asked beside a settled model: how much is taken away, and in which noise, follow
 from dataclasses import replace
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects.spring_stiffening import BESIDE_CUBIC, SpringStiffening
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
 
 OTHER_POWER = 1.2
@@ -17,6 +20,9 @@ OTHER_POWER = 1.2
 
 WORTH_A_POWER = 0.5
 """Share of what the cube leaves that another power may leave [-]."""
+
+ANOTHER_POWER = 0.99
+"""Factor between a power of the deflection that a search tried and the one from which its own is found."""
 
 MOST_ROUNDS = 3
 """Rounds in which what is taken away, the power and the noise follow each other."""
@@ -44,6 +50,27 @@ def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
         if other.fit.excess < WORTH_A_POWER * now.fit.excess:
             now = other
     return now
+
+
+def with_its_power(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A model in which a spring stiffens by the power that explains most, not by one of those that a search tried.
+
+    A spring that is stiffer one way than the other has a free power, and is the same as one that stiffens where a
+    motion bends it to one side only: held to a round power, the one that is there may look much worse.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        noise: noise floor.
+        position: of any effect in the model.
+    """
+    effect = fit.effects[position]
+    if not isinstance(effect, SpringStiffening) or effect.exponent not in BESIDE_CUBIC:
+        return fit
+    effects = list(fit.effects)
+    effects[position] = replace(effect, exponent=ANOTHER_POWER * effect.exponent)
+    other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
+    return other if other.statistic < fit.statistic else fit
 
 
 def _followed(bench: Bench, now: Settled, position: int, power: float) -> Settled:

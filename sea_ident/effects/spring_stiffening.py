@@ -30,12 +30,12 @@ class SpringStiffening(SpringEffect):
 
     name: ClassVar[str] = "spring_stiffening"
     source: ClassVar[str] = "Vantilt et al., ICRA 2015, eq. 21"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "-", 2.0, 5.0, logarithmic=False, points=7),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("exponent", "-", 1.5, 5.0, logarithmic=False, points=8),)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column; that of another power than the third has a name of its own."""
         torque, position = self.units_of(robot)
-        unit = f"{torque}/{position}{self.exponent:g}"
+        unit = f"{torque}/{position}{self.exponent:.3g}"
         name = self.parameter_name(None if self.exponent == CUBIC else "power")
         return (Column(name, unit, self.name, self.joint, self.side),)
 

@@ -82,6 +82,22 @@ def test_play_that_a_nearly_straight_spring_never_closes_is_an_offset_and_declar
     assert width * amount == pytest.approx(1.2, rel=0.1)
 
 
+def test_a_spring_that_stiffens_by_any_power_is_declared_beside_one_with_two_sides(laboratory):
+    """Bent to one side only, both give the same torque; held to the square, the one that is there looks worse."""
+    planted = [("spring_stiffening", "hip", [-2500.0], {"exponent": 1.9})]
+    bench = laboratory.bench(laboratory.record(planted, periods=6))
+    deflection = bench.data.motion.deflection[:, 0]
+    assert np.all(deflection > 0.0) or np.all(deflection < 0.0)
+    start = settle(bench, bench.effects)
+    effects = (*start.fit.effects, make_effect("asymmetric_spring", "hip", exponent=2.0))
+    asymmetric = bench.refine(effects, start.noise, start=start.fit.parameters, only=len(start.fit.effects))
+    final = settle_again(bench, asymmetric)
+    found = declared(rivals(bench, Selection(start, final, 1, (1e-9,))))[len(start.fit.effects)]
+    stiffening = next(a for a in found if (a.effect, a.joint) == ("spring_stiffening", "hip"))
+    assert stiffening.fit.effects[-1].exponent == pytest.approx(1.9, abs=0.05)
+    assert stiffening.fit.statistic == pytest.approx(final.fit.statistic, rel=1e-3)
+
+
 def test_what_is_shorter_than_is_compared_is_no_rival(preloaded, monkeypatch):
     """As a push that never pauses, which is a constant by the name of a push."""
     bench, _, selection = preloaded
