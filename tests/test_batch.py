@@ -145,6 +145,7 @@ def kill_worker(task):
     return _one(task)
 
 
+@pytest.mark.scenario
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_a_recording_that_kills_its_worker_is_a_row_like_any_other(robot, fleet, monkeypatch):
     monkeypatch.setattr("sea_ident.batch._one", kill_worker)

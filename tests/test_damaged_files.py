@@ -118,9 +118,9 @@ def test_any_edit(kind, files, contents):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", READERS)
-@pytest.mark.parametrize("seed", range(2, 6))
+@pytest.mark.parametrize("seed", [2, 3])
 def test_many_edits(kind, seed, files, contents):
-    edits(kind, files, contents, seed, rounds=700)
+    edits(kind, files, contents, seed, rounds=600)
 
 
 @pytest.mark.parametrize("kind", READERS)
@@ -188,7 +188,7 @@ def test_a_kill_during_identify_leaves_a_whole_model_or_none(files, tmp_path):
     before = out.read_bytes()
     chance = random.Random(0)
     kills = 0
-    for round_ in range(14):
+    for round_ in range(8):
         if round_ % 2:  # over an older file, and where there was none
             out.unlink(missing_ok=True)
             report.unlink(missing_ok=True)
@@ -203,4 +203,4 @@ def test_a_kill_during_identify_leaves_a_whole_model_or_none(files, tmp_path):
             assert report.read_text().rstrip().endswith("</html>")
         shown = {name for name in os.listdir(tmp_path) if name[0] != "."}
         assert shown <= {"MODEL.json", "report.html"}
-    assert kills > 5
+    assert kills > 3

@@ -140,6 +140,7 @@ def test_a_fleet_on_a_cluster(slider, fleet, cluster):
     assert contents(spread) == contents(serial)
 
 
+@pytest.mark.scenario
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_a_worker_killed_while_it_identifies(slider, fleet, cluster):
     serial = identify_batch(slider, fleet, fleet / "serial", period=PERIOD, jobs=1)

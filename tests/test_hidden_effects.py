@@ -1,4 +1,4 @@
-"""About thirty cases of the hidden-effect benchmark, with bounds that fail when naming breaks.
+"""Eighteen cases of the hidden-effect benchmark, with bounds that fail when naming breaks.
 
 The whole benchmark is `python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR`.
 """
@@ -17,10 +17,10 @@ from tests.benchmarks.hidden_effects.table import misses_text
 
 SEED = 2015
 CASES = {
-    "none": (1, 4, 5, 6, 10, 11, 14, 18),
-    "one": (3, 6, 7, 9, 12, 13, 15, 16, 18, 19, 21, 22, 25, 28),
-    "other_form": (3, 4, 5, 7),
-    "unknown": (0, 1, 3, 4),
+    "none": (1, 4, 5, 6),
+    "one": (3, 6, 7, 9, 12, 13, 15, 16),
+    "other_form": (3, 4, 5),
+    "unknown": (0, 1, 3),
 }
 """The first cases of each row that are about the leg with a period of 5 s at most: the arms and 8 s take longer."""
 
@@ -41,7 +41,7 @@ def test_hidden_effects_are_found_and_nothing_is_invented(tmp_path: Path) -> Non
     assert found >= 0.75 * len(single), told
     assert covered >= 0.85 * len(single), told
     wrong = [s for s in scores if s.named and s.false_beyond_sets() and s.case.row != "unknown"]
-    assert len(wrong) <= 2, told
+    assert len(wrong) <= 1, told
     assert sum(s.named for s in rows["unknown"]) <= 1, told
 
 

@@ -61,6 +61,7 @@ def least(jittery, laboratory):
     return next(d for d in found if (d.effect, d.joint) == ("stribeck_friction", "knee"))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("late", "seen"), [(False, []), (True, [("stribeck_friction", "knee")])])
 def test_a_search_sees_what_acts_beside_reversals_only_by_what_lets_go_late(sticking, monkeypatch, late, seen):
     bench, _ = sticking
@@ -70,6 +71,7 @@ def test_a_search_sees_what_acts_beside_reversals_only_by_what_lets_go_late(stic
     assert named(confirm(bench, search(bench, bench.effects)).selection) == seen
 
 
+@pytest.mark.scenario
 def test_the_samples_beside_reversals_show_it(sticking):
     bench, (near, confirmed) = sticking
     assert named(confirmed.selection) == [("stribeck_friction", "knee")]
@@ -84,6 +86,7 @@ def test_the_samples_beside_reversals_show_it(sticking):
         assert size * np.exp(-((speed / effect.speed) ** effect.exponent)) == pytest.approx(truth, rel=0.2)
 
 
+@pytest.mark.scenario
 def test_another_motion_is_compared_beside_its_reversals_too(sticking, laboratory):
     _, (near, confirmed) = sticking
     held, _ = held_out(near, confirmed.selection, laboratory.record(periods=2, motion=1))
@@ -117,6 +120,7 @@ def test_what_is_said_to_be_the_smallest_belongs_to_a_shape(least):
     assert least.shapes == (("speed", 0.1, "rad/s"), ("exponent", 2.0, "-"))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("times", "seen"), [(0.4, []), (2.0, [("stribeck_friction", "knee")])])
 def test_friction_smaller_than_the_smallest_is_not_seen_and_larger_is(jittery, laboratory, least, times, seen):
     shapes = (value for _, value, _ in least.shapes)
@@ -125,6 +129,7 @@ def test_friction_smaller_than_the_smallest_is_not_seen_and_larger_is(jittery, l
     assert named(confirmed.selection) == seen
 
 
+@pytest.mark.scenario
 def test_where_what_is_left_may_be_chance_nothing_is_looked_for(sticking, monkeypatch):
     bench, _ = sticking
     monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.lack_of_fit", lambda *_: (1.0, 1, 2e-3))

@@ -183,6 +183,7 @@ def test_a_joint_that_is_not_measured_is_refused(settled):
         breakaway_excess(bench, fit, "toe")
 
 
+@pytest.mark.scenario
 def test_a_torque_that_is_late_is_none_that_lets_go_late(laboratory):
     """In the model the delay is nothing that breaks away; without it the torque of another instant stands there."""
     delay = make_effect("torque_delay", "knee", delay=0.02)

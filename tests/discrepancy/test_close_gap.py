@@ -55,11 +55,13 @@ def without_reference(recording):
     return type(recording)(recording.time, columns, recording.source)
 
 
+@pytest.mark.scenario
 def test_both_are_added_and_nothing_is_left(closed):
     assert closed.verdict == "none"
     assert set(closed.added) == {("spring_offset", "knee"), ("torque_ripple", "hip")}
 
 
+@pytest.mark.scenario
 def test_the_history_shows_the_gap_shrink_in_torque_and_in_simulation(closed):
     first, last = closed.history[0], closed.history[-1]
     assert first.torque_held_out[1] < 0.15 * first.torque_held_out[0]
@@ -69,6 +71,7 @@ def test_the_history_shows_the_gap_shrink_in_torque_and_in_simulation(closed):
     assert "simulated q" in closed.summary()
 
 
+@pytest.mark.scenario
 def test_what_cancels_in_the_motor_torque_is_kept(closed):
     spring = next(s for s in closed.model.springs if s.joint == "knee")
     value, std = spring.terms[0].values[0], spring.terms[0].stds[0]
@@ -76,6 +79,7 @@ def test_what_cancels_in_the_motor_torque_is_kept(closed):
     assert abs(value - 1.0) < 5.0 * std
 
 
+@pytest.mark.scenario
 def test_saved_read_back_and_diagnosed_again_nothing_is_missing(closed, recordings, tmp_path):
     closed.model.save(tmp_path / "m.json")
     again = read_model(tmp_path / "m.json")
@@ -91,6 +95,7 @@ def models(leg, recordings):
     return [identify(leg, recordings[0], effects=chosen, period=PERIOD) for chosen in (effects, whole)]
 
 
+@pytest.mark.scenario
 def test_without_a_reference_the_measured_motion_stands_in_and_it_is_said(leg, models, recordings):
     bare = without_reference(recordings[1])
     found = simulation_gap(*models, bare, wide_processing(bare, leg, PERIOD))
@@ -99,6 +104,7 @@ def test_without_a_reference_the_measured_motion_stands_in_and_it_is_said(leg, m
     assert set(found.gaps) == {"q", "theta", "tau"}
 
 
+@pytest.mark.scenario
 def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(leg, models, recordings):
     processed = wide_processing(recordings[1], leg, PERIOD)
     true = command_of(models[1], recordings[1], processed, VelocityController())
@@ -108,6 +114,7 @@ def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(leg
     assert "stand in for the reference" in other.note
 
 
+@pytest.mark.scenario
 def test_a_model_that_cannot_be_simulated_gives_no_gap_but_the_reason(leg, models, recordings):
     springs = tuple(replace(s, stiffness=-1.0, linear_stiffness=-1.0) for s in models[0].springs)
     broken = replace(models[0], springs=springs)
@@ -116,6 +123,7 @@ def test_a_model_that_cannot_be_simulated_gives_no_gap_but_the_reason(leg, model
     assert "no forward simulation of the model before the repair" in found.notes[-1]
 
 
+@pytest.mark.scenario
 def test_a_second_one_of_a_kind_at_a_joint_is_added_too(models, recordings, monkeypatch):
     """As any effect: what the first diagnosis leaves of another order, the second one names."""
     ripples = [make_effect("torque_ripple", "hip", order=order, number=k) for k, order in ((1, 4.0), (2, 12.0))]

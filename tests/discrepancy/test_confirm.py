@@ -42,6 +42,7 @@ def both(laboratory):
     return bench, selected(bench, [AT_REVERSALS, RIPPLE])
 
 
+@pytest.mark.scenario
 def test_before_confirmation_both_seem_to_be_there(both):
     bench, selection = both
     fit = selection.final.fit
@@ -51,6 +52,7 @@ def test_before_confirmation_both_seem_to_be_there(both):
         assert less.statistic - fit.statistic > 50.0
 
 
+@pytest.mark.scenario
 def test_what_is_seen_only_near_reversals_is_dropped(both):
     bench, selection = both
     found = confirm(bench, selection)
@@ -62,6 +64,7 @@ def test_what_is_seen_only_near_reversals_is_dropped(both):
     assert found.bench.data.alike == BARELY_SEEN
 
 
+@pytest.mark.scenario
 def test_what_does_not_stand_out_of_the_scatter_of_the_passes_is_dropped(laboratory):
     """Friction that differs from pass to pass far beyond the samples that are left out: the mean of twelve shows it."""
     recording = laboratory.record([], periods=12, seed=1, jitter=FrictionJitter(spread=1.0, speed=0.3))
@@ -104,6 +107,7 @@ def test_more_is_left_out_around_reversals(rippled):
     assert np.all(data.left_out[alone])
 
 
+@pytest.mark.scenario
 def test_without_removes_what_is_weak_and_fits_the_rest_anew(both):
     bench, _ = both
     extra = selected(bench, [AT_REVERSALS, RIPPLE, make_effect("torque_offset", "ankle")])
@@ -122,6 +126,7 @@ def test_without_removes_what_is_weak_and_fits_the_rest_anew(both):
     assert ("stribeck_friction", "knee") in {c.key[:2] for c in left.candidates}
 
 
+@pytest.mark.scenario
 def test_without_everything_is_the_start(both):
     bench, selection = both
     left = without(bench, selection, [0, 1])

@@ -155,6 +155,7 @@ def test_creep_is_no_hysteresis(laboratory, leg):
     assert one.sentence in said.text
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     "beside",
     [
@@ -171,6 +172,7 @@ def test_hysteresis_is_no_creep_whatever_else_is_missing(laboratory, beside):
     assert unnamed(bench, selection, None) == ()
 
 
+@pytest.mark.scenario
 def test_dry_friction_that_hardly_slips_is_no_creep(laboratory):
     """It is less like the form of the library than like creep, and most like dry friction that is wider."""
     planted = [(PlantedBoucWen("ankle"), [1.0])]

@@ -46,6 +46,7 @@ def test_bad_encoders_do_not_blur_the_sign_of_a_velocity(laboratory):
     assert np.mean(bad.left_out) < np.mean(good.left_out) + 0.005
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("joint", "sine", "cosine"), [("ankle", -0.0354, -0.0294), ("knee", 0.05, 0.05)])
 def test_a_large_error_of_an_encoder_does_not_cost_the_spring(laboratory, joint, sine, cosine):
     """Its tangent is wrong by a factor of two to four, and a spring without stiffness would explain as much."""

@@ -197,6 +197,7 @@ def test_what_is_ruled_out_makes_room_for_what_it_stood_in_for(laboratory):
     assert now.final.fit.statistic < 1.2 * now.final.fit.dof
 
 
+@pytest.mark.scenario
 def test_where_little_holds_nothing_is_searched_beside_it(laboratory, monkeypatch):
     """A library that lacks what is there has always something else to offer."""
     planted = [("torque_ripple", "hip", [0.3, 0.1], {"order": 4.0}), ("load_dependent_friction", JOINT, [0.15], {})]

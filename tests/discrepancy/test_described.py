@@ -51,6 +51,7 @@ def test_amounts_begin_right_with_springs_that_are_described_wrong(laboratory, s
     assert begun.parameters["ankle.spring_stiffness"] == pytest.approx(120.0, rel=0.1)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("effect", "joint"), [("encoder_eccentricity", "ankle"), ("encoder_offset", "hip")])
 def test_a_large_error_of_an_encoder_is_found(laboratory, effect, joint):
     bench = laboratory.bench(laboratory.record([(effect, joint, [], LARGE[effect])], periods=6))

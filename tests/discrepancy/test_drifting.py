@@ -29,6 +29,7 @@ def without_drift_of_torque(monkeypatch):
     monkeypatch.setattr("sea_ident.discrepancy.trend_directions.effect_classes", lambda: less)
 
 
+@pytest.mark.scenario
 def test_a_torque_constant_that_drifts_is_no_friction_that_does(laboratory, without_drift_of_torque):
     planted = [("torque_constant_drift", "knee", [-0.4], {})]
     bench, start, now, trends = compared(laboratory, planted, ("torque_constant", "knee"))
@@ -61,6 +62,7 @@ def test_a_drift_of_the_library_keeps_its_name_beside_what_was_found(laboratory,
     assert drifting(bench, now, trends) == ()
 
 
+@pytest.mark.scenario
 def test_what_stays_as_it_is_does_not_drift(laboratory):
     bench, _, now, trends = compared(laboratory, [("torque_constant", "knee", [0.05], {})], ("torque_constant", "knee"))
     assert drifting(bench, now, TrendTest(trends.p_value, (), True)) == ()

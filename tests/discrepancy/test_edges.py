@@ -28,6 +28,7 @@ def pushed(laboratory):
     return bench, settle(bench, bench.effects)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("window", [(1.0, 2.0), (3.0, 3.4), (4.5, 1.5)])
 def test_the_edges_are_found_to_the_sample_from_any_window(pushed, window):
     bench, now = pushed
@@ -42,6 +43,7 @@ def test_the_edges_are_found_to_the_sample_from_any_window(pushed, window):
     assert found.parameters["knee.external_force_z"] == pytest.approx(2.0, abs=0.2)
 
 
+@pytest.mark.scenario
 def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
     """What pushes back all the time but then differs by a constant force, of which a model takes up the most."""
     bench, now = pushed
@@ -72,6 +74,7 @@ def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
     assert turned == pytest.approx(point["point_z"] * 4.0 - point["point_x"] * 2.0, abs=0.05)
 
 
+@pytest.mark.scenario
 def test_the_best_window_is_the_one_that_fits_best(pushed):
     bench, now = pushed
     effect = make_effect("external_force", "knee", start=1.0, stop=2.0, period=PERIOD)
@@ -108,6 +111,7 @@ def pushed_thigh(laboratory):
     return bench, now, Settled(shank, noise), candidates
 
 
+@pytest.mark.scenario
 def test_a_push_on_another_link_is_compared_when_its_edges_are_known(pushed_thigh):
     """A window that is a little off leaves of a large push many times what either link leaves in the end."""
     bench, now, shank, candidates = pushed_thigh
@@ -119,6 +123,7 @@ def test_a_push_on_another_link_is_compared_when_its_edges_are_known(pushed_thig
     assert thigh.statistic < beat
 
 
+@pytest.mark.scenario
 def test_a_push_on_a_link_is_not_one_on_the_axis_of_the_next_joint(pushed_thigh):
     """There it does the same, but at a place that must be found for that."""
     bench, now, shank, _ = pushed_thigh
@@ -130,6 +135,7 @@ def test_a_push_on_a_link_is_not_one_on_the_axis_of_the_next_joint(pushed_thigh)
     assert not any(getattr(push, name) for name in POINT)
 
 
+@pytest.mark.scenario
 def test_a_push_on_a_centre_of_mass_needs_no_point(pushed):
     bench, now = pushed
     effect = make_effect("external_force", "knee", start=START, stop=STOP, period=PERIOD, point_x=0.02, point_z=0.01)

@@ -21,6 +21,7 @@ def found(bench):
     return Selection(start, settle_again(bench, fit), 1, (0.0,))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("top", "exponent"), [(True, 2.0), pytest.param(False, 1.0, marks=pytest.mark.slow)])
 def test_a_soft_stop_is_no_push(laboratory, nothing_missing, top, exponent):
     q = nothing_missing[0].data.motion.q[:, 1]
@@ -38,6 +39,7 @@ def test_a_soft_stop_is_no_push(laboratory, nothing_missing, top, exponent):
     assert " rad, as a soft stop there does" in one.sentence
 
 
+@pytest.mark.scenario
 def test_a_push_while_a_joint_is_at_the_end_of_its_path_is_one(laboratory, nothing_missing):
     motion = nothing_missing[0].data.motion
     there = float(motion.time[np.argmax(motion.q[:, 1])])

@@ -71,6 +71,7 @@ def test_two_deviations_give_their_product():
     assert noise_power(deviations) == pytest.approx(0.25)
 
 
+@pytest.mark.scenario
 def test_what_is_within_the_noise_is_no_gap_and_it_is_said(leg, series):
     sensors = SensorNoise(link_position=1e-3)
     recording = simulate(leg, series[0], periods=4, sensors=sensors, jitter=FrictionJitter.none()).recording

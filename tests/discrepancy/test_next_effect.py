@@ -22,6 +22,7 @@ def in_this_process(monkeypatch):
     monkeypatch.setattr(side_by_side, "_cores", lambda: 1)
 
 
+@pytest.mark.scenario
 def test_what_promised_about_as_much_as_what_explains_it_all_is_compared(laboratory, monkeypatch):
     """Two links that a push moves in nearly the same way promise the same; which was first says nothing."""
     bench = laboratory.bench(laboratory.record([("torque_offset", "knee", [2.0], {})]))
@@ -133,6 +134,7 @@ def test_beside_many_effects_one_more_must_explain_half_of_what_is_left(
     assert (gain >= least_useful(Bench(changed, (*usual, others[0])), now)) is beside_few
 
 
+@pytest.mark.scenario
 def test_a_term_of_the_law_of_a_spring_may_be_cancelled_by_others_of_it(laboratory):
     """A spring that softens has a large one; what counts is that the whole law is stiff."""
     bench = laboratory.bench(laboratory.record([("spring_stiffening", "knee", [3000.0], {"exponent": 2.0})], periods=5))

@@ -23,6 +23,7 @@ def saturated(laboratory, coefficient, exponent, *others):
     return bench, now
 
 
+@pytest.mark.scenario
 def test_the_power_is_found_where_the_cube_leaves_much(laboratory):
     bench, cube = saturated(laboratory, 1.5e-2, 1.8)
     assert cube.fit.statistic > 1.2 * cube.fit.dof

@@ -108,6 +108,7 @@ def test_pushed_is_the_push_and_its_margin_at_its_joint():
     assert not np.any(pushed(found, TIME, 1, 0.1))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("periods", "seed"), [(4, 1), (6, 6), (9, 9)])
 def test_friction_that_differs_from_pass_to_pass_is_no_push(laboratory, periods, seed):
     recording = laboratory.record(periods=periods, seed=seed)

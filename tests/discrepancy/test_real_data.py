@@ -114,6 +114,7 @@ def test_every_pulse_is_found_as_a_push_when_it_begins(pushed, pulses):
     assert all(np.min(np.abs(truth - time)) < 0.01 for time in found)
 
 
+@pytest.mark.scenario
 def test_without_the_column_that_tells_the_pulses_they_are_found_as_well(full, pulses, pushed):
     kept = {name: values for name, values in pulses.columns.items() if not name.startswith("external_force")}
     blind = sea_ident.diagnose(full, Recording(pulses.time, kept, source="blind"))
@@ -133,6 +134,7 @@ def test_one_pass_is_told_in_weaker_words(axis, emps):
     assert any("weaker than periods" in text for text in diagnosis.warnings)
 
 
+@pytest.mark.scenario
 def test_the_flexible_link_gets_no_confident_name():
     link = sea_ident.load_robot("quanser_2dof")
     measured = recording(SQUARE_WAVE)

@@ -46,7 +46,8 @@ def compared(laboratory, leg):
     return compare
 
 
-@pytest.mark.parametrize("pairs", [range(4), pytest.param(range(4, 12), marks=pytest.mark.slow)], ids=["few", "more"])
+@pytest.mark.scenario
+@pytest.mark.parametrize("pairs", [range(4), pytest.param(range(4, 9), marks=pytest.mark.slow)], ids=["few", "more"])
 def test_nothing_changed_at_the_level_that_is_said(recorded, compared, pairs):
     """Over two motions and pairs of recordings; p-values that are too small would show."""
     found = [compared(recorded(seed=2 * k, motion=k % 2), recorded(seed=2 * k + 1, motion=0)) for k in pairs]
@@ -56,6 +57,7 @@ def test_nothing_changed_at_the_level_that_is_said(recorded, compared, pairs):
     assert not any(each.changed or each.missing for each in found)
 
 
+@pytest.mark.scenario
 def test_both_models_have_the_effects_and_shapes_of_the_earlier_one(recorded, leg, compared):
     """What one of them lacked would bend its parameters, by another motion in another way, and count as a change."""
     ripple = make_effect("torque_ripple", "hip", order=4.0)
@@ -81,6 +83,7 @@ def test_a_change_too_small_to_matter_is_none_however_sure_it_is(laboratory, com
         assert [(m.effect, m.joint) for m in found.missing] == [("coulomb_friction", "knee")] * matters
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("motion", [0, 1])
 def test_a_payload_is_found_within_its_uncertainty_and_alone(laboratory, recorded, compared, motion):
     found = compared(recorded([payload(laboratory)], motion=motion), recorded(seed=11))
@@ -91,6 +94,7 @@ def test_a_payload_is_found_within_its_uncertainty_and_alone(laboratory, recorde
     assert mass.std < 0.05
 
 
+@pytest.mark.scenario
 def test_two_changes_are_told_apart_each_with_its_own_torque(laboratory, recorded, compared):
     rubbed = ("coulomb_friction", "knee", [1.0], {})
     found = compared(recorded([payload(laboratory), rubbed]), recorded(seed=11))

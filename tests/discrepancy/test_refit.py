@@ -118,6 +118,7 @@ def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing)
     assert np.log(found.softness / shapes["softness"]) == pytest.approx(0.0, abs=3.0 * soft.std(softness))
 
 
+@pytest.mark.scenario
 def test_play_in_no_spring_gives_way_to_play_that_is_never_closed(laboratory, nothing_missing):
     """Narrow play in a spring of its own is the same constant, and cannot be."""
     bench, _ = nothing_missing
@@ -154,6 +155,7 @@ def test_play_that_is_fitted_is_held_against_play_that_is_never_closed(rippled, 
     assert fit.effects[-1].name == "backlash"
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("times", [3.0, 1.0 / 3.0])
 def test_of_two_elements_that_slip_the_one_is_not_taken_for_the_other(laboratory, times):
     slip = 0.0015

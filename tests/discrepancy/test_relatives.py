@@ -155,6 +155,7 @@ def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
     assert fit.parameters[column.name] == pytest.approx(0.15, rel=0.05)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("planted", "said"),
     [

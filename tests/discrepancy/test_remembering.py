@@ -30,6 +30,7 @@ def offset(laboratory):
     return bench, Selection(start, Settled(bench.fit(model, noise, start=fit.parameters), noise), 1, (1e-9,))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("there", "name"),
     [
@@ -58,6 +59,7 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
 
 
+@pytest.mark.scenario
 def test_a_library_without_dry_friction_in_springs_names_none(laboratory, offset, monkeypatch):
     bench, selection = offset
     planted = [("spring_offset", JOINT, [0.4 * HERE], {})]
@@ -94,6 +96,7 @@ def test_an_element_that_slips_on_the_other_motion_alone_is_found_by_it(laborato
     assert held.transfers[0].excess < 0.1 * before.excess
 
 
+@pytest.mark.scenario
 def test_what_else_is_missing_on_the_other_motion_is_no_reason_for_such_an_element(laboratory, offset):
     """The constant is the same there, and hardly anything of what is left would be explained."""
     bench, selection = offset

@@ -59,6 +59,7 @@ def identified(leg, recording, **options):
         return identify(leg, recording, period=PERIOD, **options)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("kind", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in KINDS])
 def test_a_repaired_model_is_a_model_like_any_other(laboratory, leg, series, tmp_path, kind):
     effect, close = KINDS[kind]
@@ -89,6 +90,7 @@ def test_what_drifts_is_named_and_is_no_part_of_the_model(leg, series):
     assert "friction_drift" not in [effect.name for effect in found.model.effects]
 
 
+@pytest.mark.scenario
 def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(laboratory, leg):
     effect, _ = KINDS["link"]
     recording = recorded(laboratory, "link")

@@ -68,6 +68,7 @@ def called_an_encoder(used):
     return found(used, "encoder_offset")
 
 
+@pytest.mark.scenario
 def test_what_is_called_an_offset_of_an_encoder_is_where_the_friction_rests(upright, used, called_an_encoder, there):
     position, held = len(used.effects), on(upright.bench(there), called_an_encoder)
     assert not held.transfers[0].tested
@@ -84,6 +85,7 @@ def test_what_is_called_an_offset_of_an_encoder_is_where_the_friction_rests(upri
     assert abs(fit.values[place] - HERE) < 4.0 * fit.std(place)
 
 
+@pytest.mark.scenario
 def test_what_is_called_so_and_is_the_same_on_the_other_motion_is_an_effect(upright, used, called_an_encoder):
     position = len(used.effects)
     held = on(upright.bench(recorded(upright, HERE, 1)), called_an_encoder)
@@ -97,6 +99,7 @@ def test_what_is_called_so_and_is_the_same_on_the_other_motion_is_an_effect(upri
     assert resting(now, None) == (0,)
 
 
+@pytest.mark.scenario
 def test_what_is_no_constant_of_that_spring_stays(upright, used, called_an_encoder, there):
     position, held = len(used.effects), on(upright.bench(there), called_an_encoder)
     for other in ("backlash", JOINT), ("spring_offset", "hip"):

@@ -116,6 +116,7 @@ def test_a_push_has_its_edges_right_before_another_takes_its_place(unequal, monk
     assert calls == ["sharpened", "exchange"] * added
 
 
+@pytest.mark.scenario
 def test_a_search_that_goes_on_from_another_keeps_what_is_needed_and_no_more(unequal):
     """Begun with what was found and a push that a drift, known by now, had looked like."""
     bench, found = unequal
@@ -193,6 +194,7 @@ def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
     assert ("spring_stiffening", "knee") not in {(c.effect.name, c.effect.joint) for c in scan(bench, fit, start.noise)}
 
 
+@pytest.mark.scenario
 def test_two_orders_at_one_joint_are_found_within_their_uncertainties(laboratory):
     planted = [
         ("torque_ripple", "hip", [0.8, 0.5], {"order": 12.0}),
@@ -246,6 +248,7 @@ def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, 
     assert named(still_needed(bench, begun)) == {("torque_offset", "knee")}
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("coulomb", "motion"),
     [

@@ -77,6 +77,7 @@ def test_a_late_encoder_is_no_friction_of_the_link(laboratory, planted, said):
     assert all("viscous alone" in one.sentence for one in there)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("stiffness", "said"), [(0.0, 1), pytest.param(4.0, 0, marks=pytest.mark.slow)])
 def test_a_parallel_spring_without_stiffness_is_none(laboratory, stiffness, said):
     bench = laboratory.bench(laboratory.record([("parallel_spring", "knee", (stiffness, 0.5), {})]))

@@ -85,6 +85,7 @@ def test_every_block_counts_what_is_in_it(clean):
     assert after[7] > 10.0 * before[7]
 
 
+@pytest.mark.scenario
 def test_a_planted_push_is_found_and_a_clean_stretch_has_none(laboratory, clean):
     bench, fit = clean
     motion = bench.data.motion

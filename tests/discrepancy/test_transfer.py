@@ -61,6 +61,7 @@ def test_what_is_wrong_with_one_effect_is_not_held_against_another(laboratory):
     assert not knee.holds
 
 
+@pytest.mark.scenario
 def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect(laboratory):
     hip, knee = transfers_of(
         laboratory,

@@ -38,6 +38,7 @@ def softening(laboratory):
     return bench, settle(bench, bench.effects)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("drift", "seen", "named"), [(0.15, 1e-3, []), (0.25, 1e-4, ["friction_drift"])])
 def test_a_trend_that_one_recording_in_a_thousand_shows_by_chance_has_no_name(laboratory, drift, seen, named):
     found = compared(laboratory.bench(laboratory.record([("friction_drift", "knee", [0.0, drift], {})], periods=12)))
@@ -46,6 +47,7 @@ def test_a_trend_that_one_recording_in_a_thousand_shows_by_chance_has_no_name(la
     assert not found.unnamed
 
 
+@pytest.mark.scenario
 def test_two_drifts_of_opposite_sign_are_named_at_their_joints(opposite):
     assert opposite.p_value < 1e-6
     assert not opposite.unnamed
@@ -67,6 +69,7 @@ def test_a_third_drift_has_a_name_too(laboratory):
     assert not found.unnamed
 
 
+@pytest.mark.scenario
 def test_drifts_have_their_values(opposite):
     """Whichever time constant was taken: the change within the minute that was recorded."""
     for trend in opposite.trends:
@@ -93,6 +96,7 @@ def test_a_spring_that_warms_up_has_its_first_rate_and_its_time_constant(laborat
     assert abs(trend.effect.time_constant - 20.0) < 3.0 * trend.time_constant_std < 5.0
 
 
+@pytest.mark.scenario
 def test_a_torque_constant_that_drifts_much_has_its_first_rate(laboratory):
     """Half of it within two minutes: the torque that the record shows is another share of every other one."""
     bench = laboratory.bench(laboratory.record([("torque_constant_drift", "knee", [-0.25], {})], periods=16))

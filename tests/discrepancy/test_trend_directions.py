@@ -26,6 +26,7 @@ def softening(laboratory, recording):
     return bench, settle(bench, bench.effects).fit
 
 
+@pytest.mark.scenario
 def test_columns_of_a_period_are_those_of_its_own_deflection(softening):
     bench, fit = softening
     data, effect = bench.data, make_effect("stiffness_drift", "hip")
@@ -43,6 +44,7 @@ def test_columns_of_a_period_are_those_of_its_own_deflection(softening):
     assert np.all(changes[:, :, equations.index(("knee", "motor"))] == 0.0)
 
 
+@pytest.mark.scenario
 def test_a_torque_constant_drifts_by_the_torque_that_was_measured(softening):
     """Not by what a model that may lack half of it says."""
     bench, fit = softening
@@ -51,6 +53,7 @@ def test_a_torque_constant_drifts_by_the_torque_that_was_measured(softening):
     assert np.all(rows.link == 0.0)
 
 
+@pytest.mark.scenario
 def test_periods_left_out_keep_their_places(laboratory, recording):
     """Of the last periods but one, at their times, with their temperatures."""
     whole = laboratory.data(recording)
@@ -76,6 +79,7 @@ def test_a_rate_of_the_torque_is_told_for_the_start():
     np.testing.assert_array_equal(make_effect("friction_drift", "knee").referred(other, mean), other)
 
 
+@pytest.mark.scenario
 def test_a_softer_spring_carries_less_load_in_what_depends_on_it(softening):
     """Friction c |load| sgn v takes its load from the model: of K d of the mean, where a period has another K."""
     bench, fit = softening

@@ -52,6 +52,7 @@ def test_none(model, intact):
     assert quietly(model, intact).verdict is Verdict.NONE
 
 
+@pytest.mark.scenario
 def test_named_and_held_out_periods_are_called_weaker(laboratory, leg):
     recording = laboratory.record([RIPPLE], periods=10)
     found = quietly(identified(leg, recording), recording)
@@ -80,6 +81,7 @@ def test_ambiguous_with_the_experiment_that_tells(laboratory, leg, series):
     assert pickle.loads(pickle.dumps(found)).text == found.text
 
 
+@pytest.mark.scenario
 def test_not_in_the_library_though_something_much_like_it_is(model, intact):
     """A ripple that grows with the load: one that does not is found, and what explains the recording better is said."""
     theta, motor = intact.columns["theta_knee"], model.robot.joints[1].actuator
@@ -91,6 +93,7 @@ def test_not_in_the_library_though_something_much_like_it_is(model, intact):
     assert "The same as torque_ripple at knee, but growing with the load, leaves" in found.text
 
 
+@pytest.mark.scenario
 def test_only_against_the_reference(laboratory, leg, model):
     payload = make_effect("payload", "ankle")
     values = np.resize([1.5, 0.0, 0.0, 0.15, 0.05, 0.05, 0.01, 0.0, 0.0, 0.0], len(payload.columns(leg)))
@@ -113,6 +116,7 @@ def test_cannot_tell_from_one_pass(laboratory, model):
     assert quietly(model, laboratory.record(periods=1)).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
 
 
+@pytest.mark.scenario
 def test_of_three_periods_nothing_fine_is_named(laboratory, leg):
     """What is missing shows in them, but not how they scatter along it."""
     recording = laboratory.record([RIPPLE], periods=3)
@@ -275,6 +279,7 @@ def test_a_clipped_torque_gets_no_confident_name(leg, model, intact):
     assert any("clipped" in text for text in found.warnings)
 
 
+@pytest.mark.scenario
 def test_a_holdout_of_one_period_is_said_to_test_nothing(laboratory, model, intact):
     once = laboratory.record(periods=1, motion=1)
     try:

@@ -43,6 +43,7 @@ def named(selection):
     return [(effect.name, effect.joint) for effect in selection.effects]
 
 
+@pytest.mark.scenario
 def test_the_search_without_the_slow_samples_finds_what_they_hide(lingering):
     leg = lingering.robot
     bench = Bench(lingering, (*base_effects(leg), *spring_effects(leg)))
@@ -59,6 +60,7 @@ def test_the_search_without_the_slow_samples_finds_what_they_hide(lingering):
     assert second.bench.data.left_out[:, 0].mean() > bench.data.left_out[:, 0].mean()
 
 
+@pytest.mark.scenario
 def test_more_caution_leaves_out_more_and_nothing_else(lingering):
     far = away_from_reversals(lingering, 6)
     assert np.all(far.left_out >= lingering.left_out)
@@ -66,6 +68,7 @@ def test_more_caution_leaves_out_more_and_nothing_else(lingering):
     np.testing.assert_array_equal(far.tau_motor, lingering.tau_motor)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("added", "promised", "begins"), [(1, 0.5, False), (1, 0.7, True), (0, 0.5, True), (0, 0.2, False)]
 )

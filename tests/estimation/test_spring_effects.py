@@ -130,6 +130,7 @@ def test_contradictions_in_the_file_are_refused(model, tmp_path, damage):
         read_model(tmp_path / "m.json")
 
 
+@pytest.mark.scenario
 def test_the_model_simulated_moves_like_the_truth(leg, model):
     quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none(), "periods": 1}
     truth = simulate(leg, leg_series(), effects=planted(), **quiet)

@@ -275,6 +275,7 @@ def test_rooms_change_no_faster_than_their_levers_allow(robot_of):
         assert (change / (step * speed @ levers.T + 1e-9)).max() > 0.2
 
 
+@pytest.mark.scenario
 def test_proof_is_a_lower_bound_and_tight_near_the_limit(robot_of):
     rng = np.random.default_rng(3)
     for robot, planes, _ in specimens(robot_of):
