@@ -19,6 +19,7 @@ from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
+from sea_ident.effects.presliding_friction import PreslidingFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
@@ -61,6 +62,11 @@ OWN_AMOUNT = 7.0
 
 DRIVES = 0.1
 """Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise may do [-]."""
+
+BUILDS_UP = (0.2, 2.0)
+"""Friction that builds up over a distance, in units of the dry friction beside it, at least and at most [-]. Static
+friction is larger than that in which a motor slides, but what is many times as large over a shorter way is a jump of
+another form; and where nearly all friction turns at once, it is not the contact that is late."""
 
 EXCUSED = 0.02
 """Share of the power of an effect that may be in a column of the wrong sign."""
@@ -290,6 +296,19 @@ def brakes(bench: Bench, fit: Fit, position: int) -> bool:
     return bool(-dry < DRIVES * float(np.max(np.abs(torque))))
 
 
+def builds_up(fit: Fit, position: int) -> bool:
+    """Whether friction that builds up over a distance is about the dry friction in the place of which it stands.
+
+    Asked of a fit with both: without the one, the other is any.
+    """
+    effect = fit.effects[position]
+    dry = fit.parameters.get(f"{effect.joint}.coulomb_friction")
+    if not isinstance(effect, PreslidingFriction) or dry is None:
+        return True
+    least, most = BUILDS_UP
+    return bool(least * dry <= fit.parameters[effect.parameter_name()] <= most * dry)
+
+
 def bends_another(bench: Bench, fit: Fit, position: int) -> bool:
     """Whether an effect only bends the form of another one like it: its own amount is not known.
 
@@ -342,7 +361,7 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
         return True
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
         return False
-    if not pushes_back(bench, fit, position) or not brakes(bench, fit, position):
+    if not pushes_back(bench, fit, position) or not brakes(bench, fit, position) or not builds_up(fit, position):
         return False
     if is_of_a_law(effect):
         return True  # terms of the law of one spring cancel in part, and what they come to is asked above

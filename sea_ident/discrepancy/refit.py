@@ -14,11 +14,13 @@ from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.settle import FAR
 from sea_ident.effects import Effect, Shape
 from sea_ident.effects.backlash import NEARLY_HARD, Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring import SpringEffect
+from sea_ident.effects.torque_delay import TorqueDelay
 
 LARGE_AMOUNT = 0.1
 """Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
@@ -87,12 +89,30 @@ def refitted(
     best = min(fits, key=lambda fit: (len(bench.slack_links(fit)), fit.statistic))
     if isinstance(effect, SignalEffect):
         best = from_described_springs(bench, best, len(before), noise, start, beat)
+    if isinstance(effect, TorqueDelay):
+        best = _where_friction_turns(bench, best, noise)
     if isinstance(effect, SpringEffect):
         best = _in_its_spring(bench, best, noise, len(before), beat)
         best = at_its_kink(bench, best, noise, len(before))
     if isinstance(effect, Backlash):
         best = _open(bench, best, noise, len(before))
     return with_sharp_edges(bench, best, noise, len(before), beat)
+
+
+def _where_friction_turns(bench: Bench, fit: Fit, noise: NoiseFloor) -> Fit:
+    """A model with a late torque in which friction turns as sharply as it does beside that.
+
+    As long as the delay was missing, friction seemed to turn slowly, and with that there is little left of a delay.
+
+    Args:
+        bench: the recording.
+        fit: the model with it.
+        noise: noise floor.
+    """
+    if fit.statistic > FAR * fit.dof:
+        return fit
+    bent = bench.refine(fit.effects, noise, start=fit.parameters)
+    return bent if bent.statistic < fit.statistic else fit
 
 
 def _in_its_spring(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat: float) -> Fit:

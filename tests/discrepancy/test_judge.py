@@ -13,6 +13,7 @@ from sea_ident.discrepancy.judge import (
     WRONG_PART,
     at_a_bound,
     bends_another,
+    builds_up,
     comes_first,
     dissipates,
     never_closed,
@@ -142,6 +143,21 @@ def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing
         values[names.index("knee.coulomb_friction")] = dry
         values[names.index(f"knee.{name}")] = 1.0 / largest
         assert physical(bench, replace(fit, values=values), -1) == accepted
+
+
+@pytest.mark.parametrize(("share", "accepted"), [(0.05, False), (0.3, True), (1.0, True), (1.8, True), (8.0, False)])
+def test_friction_that_builds_up_is_about_the_dry_friction_that_it_replaces(nothing_missing, share, accepted):
+    bench, start = nothing_missing
+    effect = make_effect("presliding_friction", "knee", displacement=0.002)
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    values = fit.values.copy()
+    values[-1] = share * fit.parameters["knee.coulomb_friction"]
+    assert physical(bench, replace(fit, values=values), -1) == accepted
+    # where the model has no dry friction there is nothing to hold it against
+    kept = [k for k, c in enumerate(fit.columns) if c.name != "knee.coulomb_friction"]
+    effects = tuple(e for e in fit.effects if (e.name, e.joint) != ("coulomb_friction", "knee"))
+    columns = tuple(fit.columns[k] for k in kept)
+    assert builds_up(replace(fit, effects=effects, columns=columns, values=values[kept]), len(effects) - 1)
 
 
 @pytest.mark.parametrize(

@@ -171,3 +171,19 @@ def test_of_two_elements_that_slip_the_one_is_not_taken_for_the_other(laboratory
         < EQUALLY_GOOD
         + bench.fit((*bench.effects, replace(begun, slip=slip)), start.noise, start=start.fit.parameters).statistic
     )
+
+
+def test_a_delay_is_not_hidden_by_friction_that_seemed_to_turn_slowly(laboratory):
+    """A motor whose torque is late, in a model whose friction was given three times the width over which it turns."""
+    bench = laboratory.bench(laboratory.record([("torque_delay", "hip", [], {"delay": 0.012})], periods=6))
+    start = settle(bench, bench.effects)
+    wide = tuple(
+        replace(e, smoothing=0.03) if (e.name, e.joint) == ("coulomb_friction", "hip") else e for e in bench.effects
+    )
+    late = make_effect("torque_delay", "hip", delay=0.001)
+    found = refitted(bench, wide, late, (), start.noise, start.fit.parameters)
+    assert found.effects[-1].delay == pytest.approx(0.012, rel=0.04)
+    (friction,) = (e for e in found.effects if (e.name, e.joint) == ("coulomb_friction", "hip"))
+    assert friction.smoothing == pytest.approx(0.01, rel=0.4)
+    held = bench.refine((*wide, late), start.noise, start=start.fit.parameters, only=len(wide))
+    assert held.statistic > found.statistic + 2.0 * EQUALLY_GOOD

@@ -48,8 +48,12 @@ def quietly(*arguments, **options):
         return sea_ident.diagnose(*arguments, **options)
 
 
-def test_none(model, intact):
-    assert quietly(model, intact).verdict is Verdict.NONE
+def test_none(model, intact, monkeypatch):
+    found = quietly(model, intact)
+    assert found.verdict is Verdict.NONE
+    assert "was not looked for" not in found.text
+    monkeypatch.setattr("sea_ident.discrepancy.conclude.motors_too_fast", lambda state: state.robot.joint_names[1:2])
+    assert "Ripple of the turns of the motor of knee is too fast for these samples" in quietly(model, intact).text
 
 
 @pytest.mark.scenario

@@ -1,5 +1,8 @@
 """Orders of ripple that a motion shows: up to four samples a period, whole turns of the motor among them."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -22,6 +25,11 @@ def turning(leg, speeds, step=0.005):
     return State(leg, Motion.rigid(time, time[:, None] * speed, speed, np.zeros_like(speed)))
 
 
+def with_ratios(leg, ratio):
+    """As much of the leg as is asked, with one gear at all joints."""
+    return SimpleNamespace(joint_names=leg.joint_names, gear_ratios=np.full(leg.n, ratio), index=leg.index)
+
+
 def test_the_highest_order_is_passed_with_four_samples_a_period(leg):
     state = turning(leg, [0.5, 1.0, 2.0])
     for joint, speed in zip(leg.joint_names, (0.5, 1.0, 2.0), strict=True):
@@ -39,3 +47,23 @@ def test_motors_that_turn_too_fast_have_no_ripple_of_theirs_in_the_search(leg):
     for state, there in ((slow, True), (fast, False)):
         tried = {one.order for one in make_effect("torque_ripple", leg.joint_names[1]).variants(state)}
         assert (ratios[leg.joint_names[1]] in tried) is there
+
+
+def test_a_motor_without_a_gear_has_no_turns_of_its_own(leg):
+    """However fast: its ripple is one of the joint, whose orders are looked for as far as the samples show them."""
+    direct = replace(turning(leg, [500.0] * 3), robot=with_ratios(leg, 1.0))
+    assert highest_order(direct, leg.joint_names[0]) < 1.0
+    assert motors_too_fast(direct) == ()
+    assert motors_too_fast(replace(direct, robot=with_ratios(leg, 2.0))) == leg.joint_names
+
+
+def test_the_highest_order_is_that_of_all_but_the_fastest_tenth(leg):
+    state = turning(leg, [1.0] * 3)
+    speed = state.motion.dtheta.copy()
+    speed[:1800] *= 0.5
+    other = replace(state, motion=replace(state.motion, dtheta=speed))
+    assert highest_order(other, "hip") == pytest.approx(highest_order(state, "hip"))
+    speed = speed.copy()
+    speed[:1850] = 0.5
+    slower = replace(state, motion=replace(state.motion, dtheta=speed))
+    assert highest_order(slower, "hip") == pytest.approx(2.0 * highest_order(state, "hip"))

@@ -105,6 +105,43 @@ def test_a_model_that_lacks_much_is_no_wrong_column(leg, clean):
         assert misplaced_columns(leg, base_effects(leg), processed) is None
 
 
+def test_of_two_joints_the_one_that_is_turned_is_named(tmp_path):
+    """A torque that is turned is the other one turned, with every parameter negative: the inertias tell which."""
+    inertial = (
+        '<inertial><origin xyz="0.3 0 0"/><mass value="3"/>'
+        '<inertia ixx="0.01" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    joint = '<axis xyz="0 1 0"/><limit lower="-6" upper="6" velocity="20" effort="200"/></joint>'
+    (tmp_path / "two.urdf").write_text(
+        f'<robot name="two"><link name="base"/><link name="a">{inertial}</link><link name="b">{inertial}</link>'
+        f'<joint name="one" type="revolute"><parent link="base"/><child link="a"/>{joint}'
+        f'<joint name="two" type="revolute"><origin xyz="0.6 0 0"/><parent link="a"/><child link="b"/>{joint}</robot>'
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        robot = load_robot(tmp_path / "two.urdf")
+    clean = record(robot, moved(robot, 0.8), 3, **NOISE)
+    for joint in robot.joint_names:
+        wrong = reversed_(clean, ("tau_motor",), joint)
+        found = misplaced_columns(robot, base_effects(robot), processed_of(robot, wrong))
+        assert f"tau_motor_{joint} has the other sign" in found
+
+
+def test_where_the_exchange_leaves_much_the_columns_may_be_right(leg, clean):
+    """A torque that no model has, in every period, large enough to doubt all."""
+    wrong = exchanged(clean, ("tau_motor",), "hip", "ankle")
+    assert misplaced_columns(leg, base_effects(leg), processed_of(leg, wrong)) is not None
+    wave = np.sin(2.0 * np.pi * 1.7 * (wrong.time - wrong.time[0]))
+    rms = {joint: np.std(wrong.columns[f"tau_motor_{joint}"]) for joint in leg.joint_names}
+    waved = wrong.replace_columns(
+        {
+            f"tau_motor_{joint}": wrong.columns[f"tau_motor_{joint}"] + 0.3 * rms[joint] * wave
+            for joint in leg.joint_names
+        }
+    )
+    assert misplaced_columns(leg, base_effects(leg), processed_of(leg, waved)) is None
+
+
 def test_rigid_arms_have_no_other_motor_positions():
     """Of a rigid arm there are no theta columns to be named."""
     with warnings.catch_warnings():
@@ -124,6 +161,6 @@ def test_one_joint_alone_has_no_other():
     assert misplaced_columns(robot, base_effects(robot), processed_of(robot, recording)) is None
 
 
-def moved(robot):
-    a, b = np.random.default_rng(2).normal(0.0, 0.3, (2, robot.n, 5))
+def moved(robot, amplitude=0.3):
+    a, b = np.random.default_rng(2).normal(0.0, amplitude, (2, robot.n, 5))
     return truth_of(robot, FourierSeries(0.1, np.zeros(robot.n), a, b), samples=500)

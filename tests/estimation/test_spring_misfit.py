@@ -15,16 +15,18 @@ pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWa
 NOISE = {"torque_noise": 0.2, "encoder_noise": 1e-5}
 
 
-def drawn(rng, periods=10, samples=400, by_parameters=0.0, beyond=None):
+def drawn(rng, periods=10, samples=400, by_parameters=0.0, beyond=None, scatter=1.0, not_by_scatter=0.0):
     """A spring whose mean torque errs by noise of the samples and by two base parameters, as its periods show."""
     angle = 2.0 * np.pi * np.arange(samples) / samples
     columns = np.column_stack([np.sin(angle), np.sin(3.0 * angle), np.cos(angle)])
-    rows = np.column_stack([np.cos(2.0 * angle), np.sin(5.0 * angle)])
-    each = rng.standard_normal((periods, samples))
+    # a part of what the parameters do is what the law does
+    rows = np.column_stack([np.cos(2.0 * angle) + np.sin(angle), np.sin(5.0 * angle)])
+    each = scatter * rng.standard_normal((periods, samples))
     moves = by_parameters * rng.standard_normal((periods, 2))
     influences = (moves - moves.mean(axis=0)) / periods
     covariance = influences.T @ influences * periods / (periods - 1.0)
-    known = Uncertainty(covariance, periods - 1.0, CovarianceKind.PERIODS, influences, covariance)
+    whole = covariance + not_by_scatter**2 * np.eye(2)
+    known = Uncertainty(whole, periods - 1.0, CovarianceKind.PERIODS, influences, covariance)
     inverse = np.linalg.pinv(columns)
     mean = each.mean(axis=0) + rows @ moves.mean(axis=0) + (0.0 if beyond is None else beyond)
     left = mean - columns @ (inverse @ mean)
@@ -38,6 +40,44 @@ def test_noise_alone_is_no_misfit_whatever_carries_it(by_parameters):
     assert np.sqrt(np.mean([m.ratio**2 for m in found])) == pytest.approx(1.0, abs=0.25)
     # few base parameters that carry the noise make its energy vary by factors
     assert sum(m.covariance is not None for m in found) <= 20
+
+
+@pytest.mark.parametrize("by_parameters", [0.0, 1.0])
+def test_the_noise_is_what_the_mean_scatters_by(by_parameters):
+    """With few samples the share that the law follows, and with few periods that of their mean, are large."""
+    rng = np.random.default_rng(8)
+    found = [drawn(rng, periods=5, samples=24, by_parameters=by_parameters)[0] for _ in range(1500)]
+    noise, left = (
+        np.mean([value(m) for m in found]) for value in (lambda m: m.noise**2, lambda m: (m.ratio * m.noise) ** 2)
+    )
+    assert left / noise == pytest.approx(1.0, abs=0.05)
+
+
+def test_what_parameters_err_by_beyond_their_scatter_counts():
+    plain, more = (drawn(np.random.default_rng(9), not_by_scatter=size)[0] for size in (0.0, 0.5))
+    # the first column less what the law has of it leaves the wave that the law does not have; both have a power of half
+    assert more.noise**2 - plain.noise**2 == pytest.approx(0.5**2 * (0.5 + 0.5), rel=1e-6)
+
+
+def test_only_what_is_beyond_the_noise_is_counted():
+    """The same mean residual with no scatter, and with one that is a third of its energy."""
+    wave = np.sin(7.0 * 2.0 * np.pi * np.arange(400) / 400) + np.sin(3.02 * 2.0 * np.pi * np.arange(400) / 400)
+    whole, part = (_of_a_wave(wave, scatter) for scatter in (1e-3, 1.4))
+    share = 1.0 - 1.0 / part.ratio**2
+    assert 0.5 < share < 0.8
+    np.testing.assert_allclose(part.covariance, share * whole.covariance, rtol=1e-3, atol=1e-9)
+
+
+def _of_a_wave(wave, scatter, periods=10):
+    """The misfit of a law that lacks a wave, by periods that scatter about that very mean."""
+    angle = 2.0 * np.pi * np.arange(len(wave)) / len(wave)
+    columns = np.column_stack([np.sin(angle), np.sin(3.0 * angle), np.cos(angle)])
+    inverse = np.linalg.pinv(columns)
+    left = wave - columns @ (inverse @ wave)
+    each = scatter * np.random.default_rng(4).standard_normal((periods, len(wave)))
+    known = Uncertainty(np.zeros((1, 1)), 9.0, CovarianceKind.PERIODS, np.zeros((periods, 1)), np.zeros((1, 1)))
+    rows = np.zeros((len(wave), 1))
+    return spring_misfit(left + each - each.mean(axis=0), inverse, columns, rows, known)
 
 
 def test_a_ratio_that_base_parameters_reach_by_chance_is_none_where_samples_carry_the_noise():
