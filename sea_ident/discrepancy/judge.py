@@ -136,13 +136,15 @@ def spread(steps: FloatArray, change: FloatArray) -> float:
 def at_a_bound(effect: Effect) -> bool:
     """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else.
 
-    So is dry friction that turns over as slowly as any may.
+    So is dry friction that turns over as slowly as any may, and friction that grows with as low a power as there is.
     """
     for shape in effect.shapes:
         value = float(getattr(effect, shape.name))
         least, most = value < 1.02 * shape.lower, value > 0.98 * shape.upper
         if shape.name == "smoothing":
             least = False  # as sharp as any is dry friction as it should be
+        elif isinstance(effect, NonlinearViscousFriction):
+            most = False  # friction that hardly grows with the speed is dry friction of another form
         elif not shape.logarithmic or shape.name in ("softness", "order", "time_constant"):
             continue
         if least or most:
@@ -361,6 +363,8 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
         return True
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
         return False
+    if isinstance(effect, NonlinearViscousFriction) and at_a_bound(effect):
+        return False  # where it ends beside what came after it, too
     if not pushes_back(bench, fit, position) or not brakes(bench, fit, position) or not builds_up(fit, position):
         return False
     if is_of_a_law(effect):

@@ -169,6 +169,9 @@ def test_friction_that_builds_up_is_about_the_dry_friction_that_it_replaces(noth
         ("backlash", {"softness": 1.5}, False),
         ("presliding_friction", {"displacement": 1e-6}, True),
         ("presliding_friction", {"displacement": 3e-5}, False),
+        ("nonlinear_viscous_friction", {"exponent": 0.3}, True),
+        ("nonlinear_viscous_friction", {"exponent": 0.45}, False),
+        ("nonlinear_viscous_friction", {"exponent": 3.0}, False),
         ("torque_saturation", {"exponent": 9.0}, True),
         # dry friction as sharp as there is, and one that no speed of the motion is beyond
         ("link_friction", {"smoothing": 1e-4}, False),
