@@ -18,8 +18,9 @@ VARIANCE_FLOOR = 1e-6
 ROUNDS = 5
 """Rounds in which the rest of the residual is found."""
 
-FEWEST_PERIODS = 6
-"""Periods from which on the scatter is known well enough to tell where it rises."""
+FEWEST_PERIODS = 2
+"""Periods from which on there is a scatter that may rise. Of few it is known badly, and chance leaves out a sample more or
+less at low speed; but all of them would leave the bias in, as large as it is for many, beside errors that hide it less."""
 
 SPEED_BINS = 40
 """Classes of speed in which the scatter is compared."""
@@ -104,7 +105,7 @@ def steady(observations: Observations) -> FloatArray:
     is then not that of the model either: at a pass with more friction the joint is slower at the same instant, so the
     scatter is not averaged out. Weights by the variance alone are small but not small enough for that bias. A limit in
     speed, found from the same scatter, would fall elsewhere in the next recording and move the friction with it, which
-    no spread between periods shows; so the share falls smoothly as the scatter rises. With few periods, or where no
+    no spread between periods shows; so the share falls smoothly as the scatter rises. With one period, or where no
     scatter rises, all of every sample counts.
 
     Args:
