@@ -1,5 +1,7 @@
 """Wrong units, wrong columns and broken encoders are said before they spoil a model."""
 
+import warnings
+
 import numpy as np
 import pytest
 from estimation.synthetic import leg_series, record, truth_of
@@ -47,6 +49,40 @@ def test_a_sound_recording_raises_no_doubt(leg, recording):
 def test_a_wrong_unit_or_side_is_said_with_what_to_do(leg, recording, column, factor, expected):
     said = found(leg, recording, **{column: factor * recording.columns[column]})
     assert all(part in said[0] for part in (column, *expected.split(" .. "))), said
+
+
+def test_only_elastic_joints_are_told_of_their_theta(leg, recording):
+    (said, *_) = found(leg, recording, q_knee=180.0 / np.pi * recording.columns["q_knee"])
+    assert "and the same for theta_knee" in said
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        arm = load_robot("example:ur_description/urdf/ur5_robot.urdf")
+    q = np.linspace(-90.0, 90.0, 100)[:, None] * np.ones(arm.n)
+    columns = {f"q_{name}": q[:, i] for i, name in enumerate(arm.joint_names)}
+    said = doubts(Recording(0.01 * np.arange(100), columns, "arm"), arm, q, q, np.zeros_like(q))
+    assert any("is it in degrees" in text for text in said)
+    assert not any("theta" in text for text in said)
+
+
+def test_joints_that_are_held_in_the_model_alone_are_said(leg, recording):
+    """What they carry is elsewhere, whether they move or stand somewhere else."""
+    fewer = load_robot("exo_leg", joints=["hip", "knee"])
+    assert fewer.locked == {"ankle": 0.0}
+
+    def said(ankle):
+        changed = recording.replace_columns({"q_ankle": ankle})
+        kinds = ("q", "theta", "tau_motor")
+        return doubts(changed, fewer, *(changed.channel(kind, fewer.joint_names) for kind in kinds))
+
+    moving = recording.columns["q_ankle"]
+    (text,) = said(moving)
+    assert f"q_ankle goes from {moving.min():.4g} to {moving.max():.4g}, held at 0" in text
+    assert "Name ankle among the joints that move" in text
+    assert len(said(np.full_like(moving, 0.3))) == 1
+    assert said(np.full_like(moving, 0.01)) == []
+    columns = {name: values for name, values in recording.columns.items() if not name.endswith("_ankle")}
+    without = Recording(recording.time, columns, "test")
+    assert doubts(without, fewer, *(without.channel(k, fewer.joint_names) for k in ("q", "theta", "tau_motor"))) == []
 
 
 def test_a_motion_somewhat_beyond_the_limits_is_a_note(leg, recording):

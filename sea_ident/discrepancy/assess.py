@@ -194,7 +194,7 @@ def detectability(
 
 
 def _needed(columns: int, tests: int, noise: NoiseFloor) -> float:
-    """Size of an effect in units of the noise that is found 19 times out of 20."""
+    """Size of an effect in units of the noise that stands out of it 19 times out of 20."""
     threshold = float(stats.f.isf(FAMILY_LEVEL / tests, columns, max(noise.total_freedom, 4.0)))
     return float(np.sqrt(threshold * columns)) + POWER_QUANTILE
 

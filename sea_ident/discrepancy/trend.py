@@ -141,9 +141,10 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
             differs = min(first.p_value, _apart(flat[0], flat[1:])) < START_LEVEL
             started = differs and _only_in_the_first(numbers, first.direction)
         if started:
+            alike = ", which are alike" if settled > LEVEL else ""
             notes = (
-                f"{bench.data.source}: the first period differs from the {periods - 1} later ones, which are "
-                "alike: the motion was still settling. It was left out of the search for trends; start recording later",
+                f"{bench.data.source}: the first period differs from the {periods - 1} later ones{alike}: the motion "
+                "was still settling. It was left out of the search for trends; start recording later",
             )
             flat, numbers, middle, omnibus = later, later @ space, middle[1:], settled
             directions = [d.over(slice(1, None)) for d in directions]

@@ -6,6 +6,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
+from sea_ident.processing.process import PERIOD_DOUBT
 
 
 def check_signs(observations: Observations, misplaced: str | None = None) -> list[str]:
@@ -31,7 +32,7 @@ def check_signs(observations: Observations, misplaced: str | None = None) -> lis
             or f"{source}: the inertia comes out negative in every joint "
             f"({', '.join(f'{name} {value:.3g}' for name, value in zip(names, inertia, strict=True))}): the torque or "
             f"current has the wrong sign; exchange it ({_exchanged(names[0])}, and so on). Or are the columns of "
-            "joints interchanged?"
+            f"joints interchanged?{_of_another_period(observations)}"
         )
     if misplaced is not None:
         return [misplaced]
@@ -41,6 +42,12 @@ def check_signs(observations: Observations, misplaced: str | None = None) -> lis
         "joints are wrong with it"
         for name in names
     ]
+
+
+def _of_another_period(observations: Observations) -> str:
+    """The doubt about the period, where there is one: a mean over other periods has any sign."""
+    doubts = [text for text in observations.processed.warnings if text.endswith(PERIOD_DOUBT)]
+    return f" Or is the period another one: {doubts[0]}" if doubts else ""
 
 
 def _exchanged(joint: str) -> str:

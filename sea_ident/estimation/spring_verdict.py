@@ -83,7 +83,8 @@ def verdict_of(
     if relative > EXCITED or torque <= 0.0:
         return (
             Verdict.NOT_EXCITED,
-            f"stiffness known to {100 * min(relative, 99.0):.0f} % only: deflections of {spread} (rms) are too small",
+            f"stiffness known to {100 * min(relative, 99.0):.0f} % only: deflections of {spread} (rms) are too small "
+            "for it, or theta - q is not what bends this spring",
         )
     linear, cubic, hysteresis = held_out["linear"], held_out["cubic"], held_out["hysteresis"]
     limit = stats.norm.ppf(1 - SUPPORT / 2) if not np.isfinite(freedom) else stats.t.ppf(1 - SUPPORT / 2, freedom)

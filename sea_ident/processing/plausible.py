@@ -27,6 +27,9 @@ STILL = 20
 MOVED = 0.1
 """Share of the range of a position by which it does not move unseen, or within a sample."""
 
+HELD = 0.02
+"""How far from where it is locked a joint may be [rad] or [m]: a brake gives that much."""
+
 FASTER = 6.0
 """Speed over that of the faster tenth of the samples from which on a step is a jump."""
 
@@ -58,7 +61,25 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
             partner = sensors[1 - k] if joint.elastic else None
             found += _still(recording.time, name, values, joint, partner)
             found += _jump(recording.time, name, values, joint)
+    found += _not_held(recording, robot)
     return [f"{recording.source}: {text}" for text in found]
+
+
+def _not_held(recording: Recording, robot: Robot) -> list[str]:
+    """Whether joints that the model holds where they are locked are elsewhere in the recording, or move."""
+    free = {}
+    for name, at in robot.locked.items():
+        if recording.has("q", name):
+            values = recording.channel("q", [name])[:, 0]
+            if float(np.max(np.abs(values - at))) > HELD:
+                free[name] = f"q_{name} goes from {values.min():.4g} to {values.max():.4g}, held at {at:.4g}"
+    if not free:
+        return []
+    return [
+        f"joints that the model holds are not held: {'; '.join(list(free.values())[:3])}"
+        f"{f'; and {len(free) - 3} more' if len(free) > 3 else ''}. What they carry is not where the model has it. "
+        f"Name {', '.join(free)} among the joints that move (load_robot, --joints), or record with them held"
+    ]
 
 
 def _say(column: str, setting: str) -> str:
@@ -103,7 +124,8 @@ def _position(joint: Joint, lower: float, upper: float, q: FloatArray) -> list[s
     spare = 2.0 * width
     if low * factor >= lower - spare and high * factor <= upper + spare:
         long = "millimetres" if joint.prismatic else "degrees"
-        return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}, and the same for theta_{joint.name}"]
+        both = f", and the same for theta_{joint.name}" if joint.elastic else ""
+        return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}{both}"]
     return [f"{where}: is it in another unit, such as counts of the encoder (unit=counts,counts_per_rev=...)?"]
 
 

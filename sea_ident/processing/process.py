@@ -17,6 +17,9 @@ from sea_ident.processing.signals import Signals, read_signals
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 
+PERIOD_DOUBT = "is that the period?"
+"""How sentences end that doubt the period."""
+
 SMOOTHING = 0.5
 """Width [s] of the window over which the torque variance is smoothed."""
 
@@ -283,7 +286,7 @@ def _check_periodicity(source: str, robot: Robot, stack: FloatArray, period: flo
         if between[i] > 0.1 * within[i] > 0.0:
             found.append(
                 f"{source}: q_{name} differs between periods of {period:g} s by {between[i]:.3g}, "
-                f"{100 * between[i] / within[i]:.0f} % of its motion: is that the period?"
+                f"{100 * between[i] / within[i]:.0f} % of its motion: {PERIOD_DOUBT}"
             )
 
 

@@ -1,9 +1,13 @@
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.synthetic import record
 from sea_ident.estimation import JointWLS, LeastSquares, PerSampleWLS, identify
 from sea_ident.exceptions import IdentificationError, RecordingError, SeaIdentWarning
+from sea_ident.processing import process
 
 
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
@@ -33,6 +37,20 @@ def test_wrong_sign_of_the_torque_is_found(leg, truth):
     )
     with pytest.raises(IdentificationError, match="negative in every joint"):
         identify(leg, flipped, period=10.0)
+
+
+def test_a_period_in_doubt_is_told_where_every_sign_seems_wrong(leg, truth):
+    recording = record(leg, truth, 4, torque_noise=0.1)
+    flipped = recording.replace_columns(
+        {f"tau_motor_{j}": -recording.columns[f"tau_motor_{j}"] for j in leg.joint_names}
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        processed = process(flipped, leg, period=10.0)
+    for doubts, said in (((), False), (("r: q_hip differs between periods: is that the period?",), True)):
+        with pytest.raises(IdentificationError, match="negative in every joint") as raised:
+            identify(leg, replace(processed, warnings=doubts))
+        assert ("Or is the period another one: r: q_hip differs" in str(raised.value)) == said
 
 
 @pytest.mark.parametrize(

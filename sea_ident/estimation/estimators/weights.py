@@ -19,8 +19,8 @@ ROUNDS = 5
 """Rounds in which the rest of the residual is found."""
 
 FEWEST_PERIODS = 2
-"""Periods from which on there is a scatter that may rise. Of few it is known badly, and chance leaves out a sample more or
-less at low speed; but all of them would leave the bias in, as large as it is for many, beside errors that hide it less."""
+"""Periods from which on there is a scatter that may rise. Of few it is known badly, and chance leaves out a sample more
+or less at low speed; but all of them would leave the bias in, which is as large as it is for many."""
 
 SPEED_BINS = 40
 """Classes of speed in which the scatter is compared."""
