@@ -8,7 +8,7 @@ from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import ABSORBED, Candidate, scan, sought
+from sea_ident.discrepancy.candidates import ABSORBED, Candidate, scan
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.findings import Alternative, Detectability
 from sea_ident.discrepancy.fit import Fit, Solution
@@ -71,7 +71,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
-        scanned = scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
+        # wherever they act: of what the model absorbs but for a trace, that may be in the equations of other joints
+        scanned = scan(bench, reduced, noise)
         tried = of_every_kind([c for c in scanned if c.key != effect_key(own)], RIVALS)
         tried = [c for c in tried if not c.gain < 0.3 * gain]
         for candidate, solution in zip(tried, side_by_side(_InPlace(bench, now, position, enough), tried), strict=True):
