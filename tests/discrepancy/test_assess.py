@@ -1,21 +1,26 @@
 """What else an effect could be: what gives the same torque is declared, what does not is not, however it is written."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import sea_ident
 from sea_ident.discrepancy.assess import no_worse, rivals
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import tried
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.transfer import transfer
-from sea_ident.effects import make_effect
-from sea_ident.simulation import Settling
+from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.motion import FourierSeries
+from sea_ident.simulation import PlantedEffect, Settling, simulate
 
 OFFSETS = [("spring_offset", "hip", [-1.2], {}), ("spring_offset", "knee", [-0.4], {})]
 """As much as the play of 2 mrad would take from the spring of the hip, whose deflection keeps its sign in both motions;
@@ -96,6 +101,27 @@ def test_a_spring_that_stiffens_by_any_power_is_declared_beside_one_with_two_sid
     stiffening = next(a for a in found if (a.effect, a.joint) == ("spring_stiffening", "hip"))
     assert stiffening.fit.effects[-1].exponent == pytest.approx(1.9, abs=0.05)
     assert stiffening.fit.statistic == pytest.approx(final.fit.statistic, rel=1e-3)
+
+
+@pytest.mark.scenario
+def test_what_the_model_takes_up_but_for_a_trace_elsewhere_is_an_alternative():
+    """A force on a vertical slide is its weight; a mass too large shows before it, as a coupling of its rotor."""
+    robot = sea_ident.load_robot(Path(__file__).parent / "scara.urdf")
+    a = [[0.76, 0.29, 1.84, -0.55, 0.13], [1.17, 0.32, 2.13, -0.66, 0.37],
+         [-0.02, 0.06, -0.01, -0.14, -0.37], [-1.12, -1.63, 3.04, -3.66, 0.76]]  # fmt: skip
+    b = [[0.18, -1.31, -1.11, 0.13, 0.36], [0.54, -2.18, -1.84, 0.51, 0.54],
+         [0.01, 0.03, -0.11, 0.09, -0.17], [0.05, -3.48, -4.82, 0.02, 1.09]]  # fmt: skip
+    series = FourierSeries(0.2, np.array([0.01, 0.15, -0.05, 0.39]), np.array(a), np.array(b))
+    force = PlantedEffect(make_effect("torque_offset", "j3"), np.array([5.0]))
+    recording = simulate(robot, series, periods=12, seed=3, effects=[force]).recording
+    effects = (*base_effects(robot), *spring_effects(robot))
+    bench = Bench(period_data(wide_processing(recording, robot, 5.0), robot), effects)
+    start = settle(bench, bench.effects)
+    coupling = make_effect("rotor_coupling", "j3")
+    final = settle_again(bench, bench.fit((*start.fit.effects, coupling), start.noise, start=start.fit.parameters))
+    assert final.fit.statistic < 1.1 * final.fit.dof < start.fit.statistic - 10.0 * EQUALLY_GOOD
+    found = declared(rivals(bench, Selection(start, final, 1, (1e-9,))))[len(start.fit.effects)]
+    assert ("torque_offset", "j3") in {(a.effect, a.joint) for a in found}
 
 
 def test_what_is_shorter_than_is_compared_is_no_rival(preloaded, monkeypatch):
