@@ -6,19 +6,22 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.breakaway import LEVEL, breakaway_p
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical, torque_changes
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, SMALLEST_SHARE, next_effect
+from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import MOST_EFFECTS
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
 from sea_ident.effects import Effect
 from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.effects.stribeck_friction import StribeckFriction
 
 SPEEDS = 12
 """Speeds from which the start of a sliding friction is refined: each twice the one before."""
@@ -46,7 +49,7 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     near = bench.comparing(compared_beside_reversals(bench.data))
     before = confirmed.selection
     now = settle_again(near, before.final.fit)
-    added: list[float] = []
+    now, added = _let_go_late(near, now) if before.added < MOST_EFFECTS else (now, list[float]())
     begun: set[str | None] = set()
     while before.added + len(added) < MOST_EFFECTS and lack_of_fit(near, now)[2] < LACK_LEVEL:
         few = [e for e in candidate_effects(near, now.fit.effects) if e.name in LIVE_BESIDE_REVERSALS]
@@ -75,6 +78,28 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
         candidates=candidates, tests=max(sum(c.tests for c in candidates), 1),
     )  # fmt: skip
     return near, Confirmed(selection, near, start, now, beside=(near, now))
+
+
+def _let_go_late(near: Bench, now: Settled) -> tuple[Settled, list[float]]:
+    """A model with the stiction that passes show where their motors are let go, and its significance.
+
+    Where it lets go at another instant in every pass, next to nothing of it is in their mean, by which it is fitted.
+
+    Args:
+        near: the recording with what is slow beside reversals compared.
+        now: the model there.
+    """
+    added: list[float] = []
+    few = [e for e in candidate_effects(near, now.fit.effects) if isinstance(e, StribeckFriction)]
+    for candidate in scan(near, now.fit, now.noise, few):
+        p_value = breakaway_p(near, now.fit, str(candidate.effect.joint))
+        if p_value > LEVEL:
+            continue
+        new = refitted(near, now.fit.effects, candidate.effect, (), now.noise, now.fit.parameters)
+        if physical(near, new, -1) and now.fit.statistic - new.statistic > EQUALLY_GOOD * new.unit:
+            now = settle_again(near, new)
+            added.append(p_value)
+    return now, added
 
 
 def with_sliding_start(near: Bench, now: Settled, joint: str | None) -> Settled:

@@ -5,15 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy import beside_reversals
 from sea_ident.discrepancy.assess import detectability
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import confirm
 from sea_ident.discrepancy.heldout import held_out
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.standing import BESIDE_REVERSALS
+from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
@@ -132,7 +134,27 @@ def test_friction_smaller_than_the_smallest_is_not_seen_and_larger_is(jittery, l
 @pytest.mark.scenario
 def test_where_what_is_left_may_be_chance_nothing_is_looked_for(sticking, monkeypatch):
     bench, _ = sticking
+    monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.breakaway_p", lambda *_: 1.0)
     monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.lack_of_fit", lambda *_: (1.0, 1, 2e-3))
     same, confirmed = searched_beside_reversals(bench, unsearched(bench))
     assert same is bench
     assert named(confirmed.selection) == []
+
+
+def test_what_lets_a_motor_go_late_is_stiction_where_the_mean_shows_a_trace_of_it(laboratory, monkeypatch):
+    """By the passes, not by the mean: and only where the mean does not speak against it."""
+    late = {"knee": 1e-12}
+    monkeypatch.setattr(beside_reversals, "breakaway_p", lambda near, fit, joint: late.get(joint, 1.0))
+    planted = [("stribeck_friction", "knee", [0.3], {"speed": 0.05})]
+    bench = laboratory.bench(laboratory.record(planted))
+    near = bench.comparing(compared_beside_reversals(bench.data))
+    start = settle(near, near.effects)
+    found, added = beside_reversals._let_go_late(near, start)
+    assert added == [1e-12]
+    assert [(e.name, e.joint) for e in found.fit.effects[len(near.effects) :]] == [("stribeck_friction", "knee")]
+    assert start.fit.statistic - found.fit.statistic > EQUALLY_GOOD
+    with monkeypatch.context() as patch:
+        patch.setattr(beside_reversals, "EQUALLY_GOOD", 1e3 * EQUALLY_GOOD)
+        assert beside_reversals._let_go_late(near, start) == (start, [])
+    late.clear()
+    assert beside_reversals._let_go_late(near, start) == (start, [])
