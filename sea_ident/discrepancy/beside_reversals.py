@@ -35,7 +35,8 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
 
     What the mean leaves there is not noise alone: the corner of friction that a band-limited speed misses, a motor that
     friction holds. So that must be more than chance as a whole, and an effect must explain a share of it as anywhere
-    else, stand out of the scatter of the periods along its own column, and be the best of the whole library.
+    else, stand out of the scatter of the periods along its own column, and be the best of the whole library. Stiction
+    is looked for in the passes first: where it lets go at another instant in each, the mean hardly shows it.
 
     Args:
         bench: the recording.
@@ -49,7 +50,7 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     near = bench.comparing(compared_beside_reversals(bench.data))
     before = confirmed.selection
     now = settle_again(near, before.final.fit)
-    now, added = _let_go_late(near, now) if before.added < MOST_EFFECTS else (now, list[float]())
+    now, added = _let_go_late(near, now, MOST_EFFECTS - before.added)
     begun: set[str | None] = set()
     while before.added + len(added) < MOST_EFFECTS and lack_of_fit(near, now)[2] < LACK_LEVEL:
         few = [e for e in candidate_effects(near, now.fit.effects) if e.name in LIVE_BESIDE_REVERSALS]
@@ -80,7 +81,7 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     return near, Confirmed(selection, near, start, now, beside=(near, now))
 
 
-def _let_go_late(near: Bench, now: Settled) -> tuple[Settled, list[float]]:
+def _let_go_late(near: Bench, now: Settled, most: int) -> tuple[Settled, list[float]]:
     """A model with the stiction that passes show where their motors are let go, and its significance.
 
     Where it lets go at another instant in every pass, next to nothing of it is in their mean, by which it is fitted.
@@ -88,12 +89,13 @@ def _let_go_late(near: Bench, now: Settled) -> tuple[Settled, list[float]]:
     Args:
         near: the recording with what is slow beside reversals compared.
         now: the model there.
+        most: how many effects may be added.
     """
     added: list[float] = []
     few = [e for e in candidate_effects(near, now.fit.effects) if isinstance(e, StribeckFriction)]
     for candidate in scan(near, now.fit, now.noise, few):
         p_value = breakaway_p(near, now.fit, str(candidate.effect.joint))
-        if p_value > LEVEL:
+        if p_value > LEVEL or len(added) == most:
             continue
         new = refitted(near, now.fit.effects, candidate.effect, (), now.noise, now.fit.parameters)
         if physical(near, new, -1) and now.fit.statistic - new.statistic > EQUALLY_GOOD * new.unit:

@@ -132,13 +132,14 @@ def test_friction_smaller_than_the_smallest_is_not_seen_and_larger_is(jittery, l
 
 
 @pytest.mark.scenario
-def test_where_what_is_left_may_be_chance_nothing_is_looked_for(sticking, monkeypatch):
+@pytest.mark.parametrize(("late", "seen"), [(1.0, []), (1e-12, [("stribeck_friction", "knee")])])
+def test_where_what_is_left_may_be_chance_nothing_is_looked_for_but_in_the_passes(sticking, monkeypatch, late, seen):
     bench, _ = sticking
-    monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.breakaway_p", lambda *_: 1.0)
+    monkeypatch.setattr(beside_reversals, "breakaway_p", lambda *asked: late if asked[-1] == "knee" else 1.0)
     monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.lack_of_fit", lambda *_: (1.0, 1, 2e-3))
     same, confirmed = searched_beside_reversals(bench, unsearched(bench))
-    assert same is bench
-    assert named(confirmed.selection) == []
+    assert (same is bench) == (not seen)
+    assert named(confirmed.selection) == seen
 
 
 def test_what_lets_a_motor_go_late_is_stiction_where_the_mean_shows_a_trace_of_it(laboratory, monkeypatch):
@@ -149,12 +150,13 @@ def test_what_lets_a_motor_go_late_is_stiction_where_the_mean_shows_a_trace_of_i
     bench = laboratory.bench(laboratory.record(planted))
     near = bench.comparing(compared_beside_reversals(bench.data))
     start = settle(near, near.effects)
-    found, added = beside_reversals._let_go_late(near, start)
+    found, added = beside_reversals._let_go_late(near, start, 1)
     assert added == [1e-12]
     assert [(e.name, e.joint) for e in found.fit.effects[len(near.effects) :]] == [("stribeck_friction", "knee")]
     assert start.fit.statistic - found.fit.statistic > EQUALLY_GOOD
     with monkeypatch.context() as patch:
         patch.setattr(beside_reversals, "EQUALLY_GOOD", 1e3 * EQUALLY_GOOD)
-        assert beside_reversals._let_go_late(near, start) == (start, [])
+        assert beside_reversals._let_go_late(near, start, 1) == (start, [])
+    assert beside_reversals._let_go_late(near, start, 0) == (start, [])
     late.clear()
-    assert beside_reversals._let_go_late(near, start) == (start, [])
+    assert beside_reversals._let_go_late(near, start, 1) == (start, [])
