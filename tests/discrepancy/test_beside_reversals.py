@@ -157,6 +157,9 @@ def test_what_lets_a_motor_go_late_is_stiction_where_the_mean_shows_a_trace_of_i
     with monkeypatch.context() as patch:
         patch.setattr(beside_reversals, "EQUALLY_GOOD", 1e3 * EQUALLY_GOOD)
         assert beside_reversals._let_go_late(near, start, 1) == (start, [])
+    with monkeypatch.context() as patch:
+        patch.setattr(beside_reversals, "physical", lambda *_: False)
+        assert beside_reversals._let_go_late(near, start, 1) == (start, [])
     assert beside_reversals._let_go_late(near, start, 0) == (start, [])
     late.clear()
     assert beside_reversals._let_go_late(near, start, 1) == (start, [])

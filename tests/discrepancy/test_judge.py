@@ -105,6 +105,18 @@ def test_a_spring_with_two_sides_is_stiff_to_either_side(nothing_missing, expone
     assert seen == {True, False}
 
 
+@pytest.mark.parametrize(("exponent", "accepted"), [(0.3, False), (0.5, True), (3.0, True)])
+def test_friction_that_hardly_grows_with_the_speed_is_none_of_its_own(nothing_missing, exponent, accepted):
+    """Wherever it ends beside what came after it: it is dry friction by another name."""
+    bench, start = nothing_missing
+    effect = make_effect("nonlinear_viscous_friction", "knee", exponent=exponent)
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    values = fit.values.copy()
+    values[-1] = 0.1
+    values[[c.name for c in fit.columns].index("knee.coulomb_friction")] = 1.0
+    assert physical(bench, replace(fit, values=values), -1) == accepted
+
+
 @pytest.mark.parametrize("exponent", [2.0, 5.0])
 def test_a_spring_of_another_power_is_stiff_however_its_terms_cancel(nothing_missing, exponent):
     """Only the whole law is a torque: a term of it may be larger than all torque there is, beside another as large."""

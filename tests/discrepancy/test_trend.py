@@ -157,16 +157,20 @@ def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
 
 @pytest.mark.scenario
 @pytest.mark.parametrize("amplitude", [3.0, 6.0])
-def test_a_start_that_still_settles_is_no_trend(laboratory, amplitude):
+def test_a_start_that_still_settles_is_no_trend(laboratory, monkeypatch, amplitude):
     """The first period is pulled, strongly at first and less and less: said, and not named."""
     recording = laboratory.record(periods=8)
     since = recording.time - recording.time[0]
     current = recording.columns["current_knee"] + amplitude * np.exp(-since / 1.5) * (since < 5.0)
     pulled = Recording(recording.time, {**recording.columns, "current_knee": current}, "pulled")
-    found = compared(laboratory.bench(pulled))
+    bench = laboratory.bench(pulled)
+    found = compared(bench)
     assert found.trends == ()
     assert not found.unnamed
-    assert "the first period differs from the 7 later ones" in found.notes[0]
+    assert "the first period differs from the 7 later ones, which are alike: the motion" in found.notes[0]
+    # where the others differ among themselves too, it is not said that they do not
+    monkeypatch.setattr("sea_ident.discrepancy.trend.LEVEL", 1.0)
+    assert "the first period differs from the 7 later ones: the motion" in compared(bench).notes[0]
 
 
 def test_three_periods_show_no_trend(laboratory):

@@ -8,6 +8,7 @@ from estimation.synthetic import record
 from sea_ident.estimation import JointWLS, LeastSquares, PerSampleWLS, identify
 from sea_ident.exceptions import IdentificationError, RecordingError, SeaIdentWarning
 from sea_ident.processing import process
+from sea_ident.processing.process import PERIOD_DOUBT
 
 
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
@@ -47,10 +48,16 @@ def test_a_period_in_doubt_is_told_where_every_sign_seems_wrong(leg, truth):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         processed = process(flipped, leg, period=10.0)
-    for doubts, said in (((), False), (("r: q_hip differs between periods: is that the period?",), True)):
+    doubt = f"r: q_hip differs between periods: {PERIOD_DOUBT}"
+    for doubts, said in (((), False), (("r: an encoder stands still",), False), (("r: other", doubt), True)):
         with pytest.raises(IdentificationError, match="negative in every joint") as raised:
             identify(leg, replace(processed, warnings=doubts))
-        assert ("Or is the period another one: r: q_hip differs" in str(raised.value)) == said
+        text = str(raised.value)
+        assert ("Or is the period another one: r: q_hip differs" in text) == ("is the period" in text) == said
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        wrong = process(recording, leg, period=7.0)
+    assert any(text.endswith(PERIOD_DOUBT) for text in wrong.warnings)
 
 
 @pytest.mark.parametrize(
