@@ -13,7 +13,15 @@ from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
-from sea_ident.discrepancy.trend_directions import Direction, Name, PeriodColumns, courses, flat_periods, steady_rows
+from sea_ident.discrepancy.trend_directions import (
+    Direction,
+    Name,
+    PeriodColumns,
+    courses,
+    flat_periods,
+    inside_of_periods,
+    steady_rows,
+)
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.discrepancy.trend_search import Chosen, alike, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import Course, course_values
@@ -26,9 +34,6 @@ SURE = 3.0
 LEVEL = 1e-4
 """Probability that a trend must have by chance at most to be one. The scatter of periods is no normal distribution far
 out: of a thousand recordings without a trend about five come out below 1e-3."""
-
-START_LEVEL = 1e-3
-"""The same for a first period that differs: to leave it out costs little."""
 
 MOST_TRENDS = 4
 """Largest number of trends that are named."""
@@ -135,11 +140,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     if periods > FEWEST_AFTER_START:
         later = flat[1:] - flat[1:].mean(axis=0)
         settled = _omnibus(later, middle[1:], noise)
-        started = omnibus < START_LEVEL < settled
-        if not started:
-            first = best_trend(numbers, directions, middle, noise)
-            differs = min(first.p_value, _apart(flat[0], flat[1:])) < START_LEVEL
-            started = differs and _only_in_the_first(numbers, first.direction)
+        started = _settles(bench, fit, noise, space, directions)
         if started:
             alike = ", which are alike" if settled > LEVEL else ""
             notes = (
@@ -221,6 +222,18 @@ def within_periods(
             beyond = weights[:, p] * (change[p] - course.mean())
             total += beyond[:, None] * (data.rows(steady_rows(bench, fit, trend.effect, p)) @ values)
     return total
+
+
+def _settles(bench: Bench, fit: Fit, noise: NoiseFloor, space: FloatArray, directions: Sequence[Direction]) -> bool:
+    """Whether the first period differs from the later ones, and these do not go on with it."""
+    middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
+    inside = inside_of_periods(bench, fit, noise)
+    if _omnibus(inside, middle, noise) < LEVEL < _omnibus(inside[1:], middle[1:], noise):
+        return True
+    numbers = inside @ space
+    first = best_trend(numbers, directions, middle, noise)
+    differs = min(first.p_value, _apart(inside[0], inside[1:])) < LEVEL
+    return differs and _only_in_the_first(numbers, first.direction)
 
 
 def _only_in_the_first(numbers: FloatArray, direction: Direction) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import spectrum, waveform
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
 from sea_ident.discrepancy.linear import whiten
@@ -120,8 +121,27 @@ def steady_rows(bench: Bench, fit: Fit, effect: TrendEffect, period: int | None 
 
 def flat_periods(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
     """(P, M) residuals of periods as they are cut, whitened by the noise of one of them, without their mean."""
+    return _flat(bench, bench.period_residuals(fit), noise)
+
+
+def inside_of_periods(bench: Bench, fit: Fit, noise: NoiseFloor) -> FloatArray:
+    """The same, faded out at both ends of every period.
+
+    What came before the first sample of a recording is not known, nor what follows its last one: accelerations there
+    are off by what was assumed, in the first and the last period alone.
+    """
+    residuals, samples = bench.period_residuals(fit), bench.data.samples
+    width = min(-(-samples // bench.data.harmonics), samples // 4)
+    ramp = np.sin(0.5 * np.pi * (np.arange(width) + 0.5) / width) ** 2
+    fade = np.concatenate([ramp, np.ones(samples - 2 * width), ramp[::-1]])[:, None]
+    beyond = residuals - residuals.mean(axis=0)
+    faded = np.stack([spectrum(waveform(each, samples) * fade, bench.data.harmonics) for each in beyond])
+    return _flat(bench, faded, noise)
+
+
+def _flat(bench: Bench, residuals: ComplexArray, noise: NoiseFloor) -> FloatArray:
     whitener = bench.whitener(noise) / np.sqrt(bench.data.periods)
-    flat = np.stack([whiten(whitener, residual) for residual in bench.period_residuals(fit)], axis=1)
+    flat = np.stack([whiten(whitener, residual) for residual in residuals], axis=1)
     flat = bench.freed(noise).off(flat).T
     return np.asarray(flat - flat.mean(axis=0), dtype=np.float64)
 

@@ -173,6 +173,24 @@ def test_a_start_that_still_settles_is_no_trend(laboratory, monkeypatch, amplitu
     assert "the first period differs from the 7 later ones: the motion" in compared(bench).notes[0]
 
 
+def test_what_is_not_known_at_the_ends_of_a_recording_is_no_start_that_settles(nothing_missing):
+    """What came before the first sample is assumed, so its accelerations are off, in the first period alone."""
+    bench, _ = nothing_missing
+    first = bench.data.period_motions[0]
+    ends = np.zeros((bench.data.samples, 1))
+    ends[:5] = ends[-5:] = 1.0
+    noise = np.std([m.ddtheta for m in bench.data.period_motions], axis=0)
+
+    def differing(where, size):
+        moved = replace(first, ddtheta=first.ddtheta + size * noise.mean(axis=0) * where)
+        motions = (moved, *bench.data.period_motions[1:])
+        return compared(Bench(replace(bench.data, period_motions=motions), bench.effects)).notes
+
+    assert differing(ends, 40.0) == ()
+    # as much in its midst is told
+    assert "the first period differs" in differing(np.roll(ends, 300, axis=0), 40.0)[0]
+
+
 def test_three_periods_show_no_trend(laboratory):
     assert compared(laboratory.bench(laboratory.record(periods=3))).p_value == 1.0
 
