@@ -24,10 +24,14 @@ def recording(leg):
     return record(leg, truth, 4, torque_noise=0.05, encoder_noise=1e-5)
 
 
+def found_in(*given) -> list[str]:
+    return [doubt.text for doubt in doubts(*given)]
+
+
 def found(leg, recording: Recording, **columns: np.ndarray) -> list[str]:
     changed = recording.replace_columns(columns)
     kinds = ("q", "theta", "tau_motor")
-    return doubts(changed, leg, *(changed.channel(kind, leg.joint_names) for kind in kinds))
+    return found_in(changed, leg, *(changed.channel(kind, leg.joint_names) for kind in kinds))
 
 
 def test_a_sound_recording_raises_no_doubt(leg, recording):
@@ -59,7 +63,7 @@ def test_only_elastic_joints_are_told_of_their_theta(leg, recording):
         arm = load_robot("example:ur_description/urdf/ur5_robot.urdf")
     q = np.linspace(-90.0, 90.0, 100)[:, None] * np.ones(arm.n)
     columns = {f"q_{name}": q[:, i] for i, name in enumerate(arm.joint_names)}
-    said = doubts(Recording(0.01 * np.arange(100), columns, "arm"), arm, q, q, np.zeros_like(q))
+    said = found_in(Recording(0.01 * np.arange(100), columns, "arm"), arm, q, q, np.zeros_like(q))
     assert any("is it in degrees" in text for text in said)
     assert not any("theta" in text for text in said)
 
@@ -72,7 +76,7 @@ def test_joints_that_are_held_in_the_model_alone_are_said(leg, recording):
     def said(ankle):
         changed = recording.replace_columns({"q_ankle": ankle})
         kinds = ("q", "theta", "tau_motor")
-        return doubts(changed, fewer, *(changed.channel(kind, fewer.joint_names) for kind in kinds))
+        return found_in(changed, fewer, *(changed.channel(kind, fewer.joint_names) for kind in kinds))
 
     moving = recording.columns["q_ankle"]
     (text,) = said(moving)
@@ -82,7 +86,7 @@ def test_joints_that_are_held_in_the_model_alone_are_said(leg, recording):
     assert said(np.full_like(moving, 0.01)) == []
     columns = {name: values for name, values in recording.columns.items() if not name.endswith("_ankle")}
     without = Recording(recording.time, columns, "test")
-    assert doubts(without, fewer, *(without.channel(k, fewer.joint_names) for k in ("q", "theta", "tau_motor"))) == []
+    assert found_in(without, fewer, *(without.channel(k, fewer.joint_names) for k in ("q", "theta", "tau_motor"))) == []
 
 
 def test_a_motion_somewhat_beyond_the_limits_is_a_note(leg, recording):
@@ -101,7 +105,7 @@ def test_milliamperes_are_recognised_by_the_limit_of_the_torque(leg, recording):
     changed = Recording(recording.time, {**columns, "current_knee": current}, "test")
     torque = np.stack([recording.columns[f"tau_motor_{name}"] for name in leg.joint_names], axis=1)
     torque[:, 1] *= 1000.0
-    (said,) = doubts(
+    (said,) = found_in(
         changed, leg, changed.channel("q", leg.joint_names), changed.channel("theta", leg.joint_names), torque
     )
     assert "--column 'current_knee=current_knee,unit=mA'" in said

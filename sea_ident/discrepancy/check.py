@@ -39,10 +39,12 @@ class Findings:
     Attributes:
         warnings: what a user should know.
         fatal: whether no conclusion can be drawn.
+        doubtful: whether the positions may not be those of the model, so that a disagreement proves nothing.
     """
 
     warnings: tuple[str, ...] = ()
     fatal: bool = False
+    doubtful: bool = False
 
 
 def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float]) -> Findings:
@@ -64,7 +66,7 @@ def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float]) -> Findin
         "every period, or does friction hold it? Nothing can be told of this recording; move that joint faster and "
         "farther, or leave it out (joints, on the command line --joints)"
     )
-    return Findings((*findings.warnings, text), fatal=True)
+    return replace(findings, warnings=(*findings.warnings, text), fatal=True)
 
 
 def models_match(model: Model, reference: Model | None) -> None:

@@ -120,6 +120,10 @@ def conclude(
     if lost:
         remainder = 0.0
     verdict = verdict_of(bench, missing, trends, change, remainder, unexplained, notes, holds)
+    # names and gaps of another motion than the robot's would be absurd
+    doubted = notes.doubtful and verdict is not Verdict.NONE
+    if doubted:
+        verdict, lost, remainder = Verdict.CANNOT_TELL, True, 0.0
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     without_doubt = (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS)
@@ -131,7 +135,7 @@ def conclude(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
-        kind=None if held is None else held.kind, nameless=nameless, sound=not notes.fatal,
+        kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted),
         standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)),
     )  # fmt: skip
     found = Diagnosis(

@@ -45,6 +45,7 @@ from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
+from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
 from sea_ident.simulation import Controller
@@ -115,6 +116,7 @@ def diagnose(
     misplaced = misplaced_columns(robot, model.effects, processed)
     if misplaced is not None:
         notes = check.Findings((*notes.warnings, misplaced), fatal=True)
+    notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
     temperature = check.temperatures(recording, data)
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)

@@ -23,6 +23,7 @@ from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
+from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
 
 FEWEST_TO_SPLIT = 6
@@ -123,7 +124,8 @@ def held_out(
     misplaced = misplaced_columns(bench.robot, bench.effects, processed)
     if misplaced is not None:
         warnings.append(f"held-out data: {misplaced}")
-    if findings.fatal or data.periods < 2 or misplaced is not None:
+    doubted = bool(texts_of(processed.doubts, DoubtKind.POSITION))
+    if findings.fatal or data.periods < 2 or misplaced is not None or doubted:
         warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")
         return other_periods(bench, selection), tuple(warnings)
     if bench.data.caution > data.caution:

@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import assess, circular
+from sea_ident.discrepancy import assess, circular, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.check import torque_units
+from sea_ident.discrepancy.conclude import without_sizes
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
@@ -40,6 +41,7 @@ from sea_ident.effects import Effect, make_effect, spring_effects
 from sea_ident.estimation import Model
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording, filter_recording
+from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.processing.variance import noise_from_curvature
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -171,6 +173,8 @@ def diagnose_unrepeated(
         recording=processed.source,
         units=torque_units(robot),
     )  # fmt: skip
+    if texts_of(processed.doubts, DoubtKind.POSITION):
+        diagnosis = without_sizes(replace(diagnosis, verdict=Verdict.CANNOT_TELL, text=words.UNSOUND))
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
     return diagnosis

@@ -19,6 +19,8 @@ FEW_PERIODS = 10
 STANDS_LONG = 0.1
 """Share of the samples of a joint that are not compared from which on a user is warned; usual are 2 to 6 % [-]."""
 
+UNSOUND = "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."
+
 DISAGREES = 1e-3
 """Probability of the lack of fit by noise below which model and data are said to disagree."""
 
@@ -264,7 +266,7 @@ def _opening(facts: Facts) -> str:
             changed = "; ".join(f"{m.title}, {m.parameters[0]} ({m.extent})" for m in facts.missing)
             return f"The model fits, but its parameters are not those of the reference. What changed: {changed}."
         case _ if not facts.sound:
-            return "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."
+            return UNSOUND
         case _ if facts.p_value < DISAGREES:
             return (
                 f"Model and data disagree beyond the noise (p {chance(facts.p_value)}), but {facts.periods} periods of "

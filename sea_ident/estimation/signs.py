@@ -6,7 +6,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.estimation.observations import Observations, base_rows
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
-from sea_ident.processing.process import PERIOD_DOUBT
+from sea_ident.processing.doubt import DoubtKind, texts_of
 
 
 def check_signs(observations: Observations, misplaced: str | None = None) -> list[str]:
@@ -46,7 +46,7 @@ def check_signs(observations: Observations, misplaced: str | None = None) -> lis
 
 def _of_another_period(observations: Observations) -> str:
     """The doubt about the period, where there is one: a mean over other periods has any sign."""
-    doubts = [text for text in observations.processed.warnings if text.endswith(PERIOD_DOUBT)]
+    doubts = texts_of(observations.processed.doubts, DoubtKind.PERIOD)
     return f" Or is the period another one: {doubts[0]}" if doubts else ""
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.processing.doubt import Doubt, DoubtKind
 from sea_ident.recordings import Recording
 from sea_ident.robot import Joint, Robot
 
@@ -34,8 +35,8 @@ FASTER = 6.0
 """Speed over that of the faster tenth of the samples from which on a step is a jump."""
 
 
-def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray, torque: FloatArray) -> list[str]:
-    """Sentences about columns that cannot be what their names say.
+def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray, torque: FloatArray) -> list[Doubt]:
+    """Doubts about columns that cannot be what their names say.
 
     Args:
         recording: where they come from.
@@ -47,22 +48,27 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
     Returns:
         What is wrong, where, and what to do; empty where all may be as it says.
     """
-    found = []
+    found: list[Doubt] = []
+
+    def doubt(kind: DoubtKind, texts: list[str]) -> None:
+        found.extend(Doubt(kind, f"{recording.source}: {text}") for text in texts)
+
     for i, joint in enumerate(robot.joints):
-        found += _position(joint, robot.limits.lower[i], robot.limits.upper[i], q[:, i])
-        found += _torque(recording, joint, robot.limits.torque[i], torque[:, i])
+        doubt(DoubtKind.POSITION, _position(joint, robot.limits.lower[i], robot.limits.upper[i], q[:, i]))
+        doubt(DoubtKind.TORQUE, _torque(recording, joint, robot.limits.torque[i], torque[:, i]))
         sensors = [(f"q_{joint.name}", q[:, i])]
         if joint.elastic:
-            found += _slope(joint, q[:, i], theta[:, i])
+            doubt(DoubtKind.POSITION, _slope(joint, q[:, i], theta[:, i]))
             if recording.has("tau_spring", joint.name):
-                found += _sensor(joint, recording.channel("tau_spring", [joint.name])[:, 0], theta[:, i] - q[:, i])
+                measured = recording.channel("tau_spring", [joint.name])[:, 0]
+                doubt(DoubtKind.TORQUE, _sensor(joint, measured, theta[:, i] - q[:, i]))
             sensors.append((f"theta_{joint.name}", theta[:, i]))
         for k, (name, values) in enumerate(sensors):
             partner = sensors[1 - k] if joint.elastic else None
-            found += _still(recording.time, name, values, joint, partner)
-            found += _jump(recording.time, name, values, joint)
-    found += _not_held(recording, robot)
-    return [f"{recording.source}: {text}" for text in found]
+            doubt(DoubtKind.SENSOR, _still(recording.time, name, values, joint, partner))
+            doubt(DoubtKind.SENSOR, _jump(recording.time, name, values, joint))
+    doubt(DoubtKind.POSITION, _not_held(recording, robot))
+    return found
 
 
 def _not_held(recording: Recording, robot: Robot) -> list[str]:

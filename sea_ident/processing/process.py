@@ -11,14 +11,12 @@ from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import filtering, harmonics, periods, torque, variance
+from sea_ident.processing.doubt import Doubt, DoubtKind
 from sea_ident.processing.encoder_steps import encoder_steps
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.processing.signals import Signals, read_signals
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
-
-PERIOD_DOUBT = "is that the period?"
-"""How sentences end that doubt the period."""
 
 SMOOTHING = 0.5
 """Width [s] of the window over which the torque variance is smoothed."""
@@ -128,6 +126,7 @@ def _one_stretch(
     channels: dict[str, FloatArray],
     notes: Sequence[str] = (),
     warnings: Sequence[str] = (),
+    doubts: Sequence[Doubt] = (),
 ) -> ProcessedRecording:
     """What was not averaged over periods; its torque noise is that of its fast part."""
     spread = np.broadcast_to(variance.noise_from_curvature(tau_motor), tau_motor.shape)
@@ -148,6 +147,7 @@ def _one_stretch(
         motor_harmonics=0,
         notes=tuple(notes),
         warnings=tuple(warnings),
+        doubts=tuple(doubts),
     )
 
 
@@ -192,7 +192,8 @@ def _periodic(
     keep = _kept_periods(recording.source, cuts, periods.holes(recording.time, cut), found, notes)
     cuts = {name: values[keep] for name, values in cuts.items()}
     count = len(keep)
-    _check_periodicity(recording.source, robot, cuts["q"], period, found)
+    doubted = _doubts_of_period(recording.source, robot, cuts["q"], period)
+    found.extend(doubt.text for doubt in doubted)
     if count == 1:
         found.append(
             f"{recording.source}: one period only: there is no scatter between periods; the variance of the torque is "
@@ -239,6 +240,7 @@ def _periodic(
         encoder_steps=encoder_steps(signals.q, signals.theta, cuts["q"], cuts["theta"], elastic),
         notes=tuple(notes),
         warnings=tuple(found),
+        doubts=(*signals.doubts, *doubted),
     )
 
 
@@ -276,18 +278,21 @@ def _kept_periods(
     return keep
 
 
-def _check_periodicity(source: str, robot: Robot, stack: FloatArray, period: float, found: list[str]) -> None:
-    """Warn where the periods differ so much that the period must be wrong."""
+def _doubts_of_period(source: str, robot: Robot, stack: FloatArray, period: float) -> list[Doubt]:
+    """Doubts where the periods differ so much that the period must be wrong."""
     if len(stack) < 2:
-        return
+        return []
+    found = []
     within = stack.std(axis=(0, 1))
     between = np.sqrt(np.mean(stack.var(axis=0, ddof=1), axis=0))
     for i, name in enumerate(robot.joint_names):
         if between[i] > 0.1 * within[i] > 0.0:
-            found.append(
+            text = (
                 f"{source}: q_{name} differs between periods of {period:g} s by {between[i]:.3g}, "
-                f"{100 * between[i] / within[i]:.0f} % of its motion: {PERIOD_DOUBT}"
+                f"{100 * between[i] / within[i]:.0f} % of its motion: is that the period?"
             )
+            found.append(Doubt(DoubtKind.PERIOD, text))
+    return found
 
 
 def _motions(
@@ -348,4 +353,4 @@ def _not_periodic(
     load = values["torque"][inside]
     tau = load * torque.transmitted(load, signals.torque.efficiency, motion.dtheta)
     channels = {name: values[name][inside] for name in signals.others}
-    return _one_stretch(source, robot, motion, tau, channels, notes, found)
+    return _one_stretch(source, robot, motion, tau, channels, notes, found, signals.doubts)

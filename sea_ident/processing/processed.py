@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from sea_ident._typing import FloatArray
 from sea_ident.motion import Motion
+from sea_ident.processing.doubt import Doubt
 from sea_ident.processing.encoder_steps import EncoderSteps
 
 
@@ -32,6 +33,7 @@ class ProcessedRecording:
         encoder_steps: steps of encoders that do not average out, None where all do.
         notes: what was done.
         warnings: what a user should know before trusting the result.
+        doubts: those of the warnings that what is concluded depends on.
     """
 
     source: str
@@ -51,6 +53,7 @@ class ProcessedRecording:
     encoder_steps: EncoderSteps | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
 
     @property
     def samples(self) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.processing import torque
+from sea_ident.processing.doubt import Doubt
 from sea_ident.processing.plausible import beyond_limits, doubts, unused
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -24,6 +25,7 @@ class Signals:
         torque: motor torques at the joint side [N m] or [N], and where they come from.
         others: (M, n) further channels by kind.
         warnings: what is doubtful.
+        doubts: those of them that what is concluded depends on.
         notes: what is worth knowing.
     """
 
@@ -32,6 +34,7 @@ class Signals:
     torque: torque.TorqueSource
     others: dict[str, FloatArray]
     warnings: list[str]
+    doubts: list[Doubt]
     notes: list[str]
 
 
@@ -84,7 +87,8 @@ def read_signals(recording: Recording, robot: Robot) -> Signals:
             "was measured that a model could explain. Are the columns the right ones?"
         )
     found.extend(source.warnings)
-    found.extend(doubts(recording, robot, q, theta, source.values))
+    doubted = doubts(recording, robot, q, theta, source.values)
+    found.extend(doubt.text for doubt in doubted)
     notes.extend(source.notes)
     notes.extend([*beyond_limits(recording, robot, q), *unused(recording, robot)])
     others = {
@@ -92,4 +96,4 @@ def read_signals(recording: Recording, robot: Robot) -> Signals:
     }
     if robot.elastic_indices.size:
         others["deflection"] = theta - q
-    return Signals(q, theta, source, others, found, notes)
+    return Signals(q, theta, source, others, found, doubted, notes)

@@ -1,12 +1,14 @@
 """Planted effects are found, named and shown to transfer; nothing is named where nothing is missing."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sea_ident
 from sea_ident.exceptions import DiagnosisError
+from sea_ident.recordings import Recording
 
 
 def recorded(laboratory, planted, seed):
@@ -130,3 +132,30 @@ def test_nothing_is_concluded_where_joints_changed_places(intact, intact_model):
     assert tested.verdict == "none"
     assert any(text.startswith("held-out data: ") and "look exchanged" in text for text in tested.warnings)
     assert any("cannot be used; nothing was tested on it" in text for text in tested.warnings)
+
+
+@pytest.mark.scenario
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_model):
+    """Neither of a recording, nor of one pass of it, nor on one held out; where nothing disagrees, that holds."""
+    training, holdout = intact
+
+    def in_degrees(recording):
+        return recording.replace_columns(
+            {f"{k}_knee": np.degrees(recording.columns[f"{k}_knee"]) for k in ("q", "theta")}
+        )
+
+    spoiled = in_degrees(training)
+    model = sea_ident.identify(leg, spoiled, period=5.0)
+    one_pass = Recording(spoiled.time[:1500], {name: v[:1500] for name, v in spoiled.columns.items()}, "one pass")
+    for recording in (spoiled, one_pass):
+        found = sea_ident.diagnose(model, recording)
+        assert (found.verdict, found.missing, found.model) == ("cannot_tell", (), None)
+        assert "the warnings say what" in found.text
+        assert any("q_knee goes from" in text and "is it in degrees?" in text for text in found.warnings)
+    tested = sea_ident.diagnose(intact_model, training, holdout=in_degrees(holdout))
+    assert tested.verdict == "none"
+    assert any(text.startswith("held-out data: ") and "in degrees" in text for text in tested.warnings)
+    assert any("cannot be used; nothing was tested on it" in text for text in tested.warnings)
+    narrow = replace(leg, limits=replace(leg.limits, lower=leg.limits.lower + 50.0, upper=leg.limits.upper + 50.0))
+    assert sea_ident.diagnose(replace(intact_model, robot=narrow), training).verdict == "none"

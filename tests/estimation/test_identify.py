@@ -8,7 +8,7 @@ from estimation.synthetic import record
 from sea_ident.estimation import JointWLS, LeastSquares, PerSampleWLS, identify
 from sea_ident.exceptions import IdentificationError, RecordingError, SeaIdentWarning
 from sea_ident.processing import process
-from sea_ident.processing.process import PERIOD_DOUBT
+from sea_ident.processing.doubt import Doubt, DoubtKind, texts_of
 
 
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
@@ -48,16 +48,17 @@ def test_a_period_in_doubt_is_told_where_every_sign_seems_wrong(leg, truth):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         processed = process(flipped, leg, period=10.0)
-    doubt = f"r: q_hip differs between periods: {PERIOD_DOUBT}"
-    for doubts, said in (((), False), (("r: an encoder stands still",), False), (("r: other", doubt), True)):
+    still = Doubt(DoubtKind.SENSOR, "r: an encoder stands still")
+    doubt = Doubt(DoubtKind.PERIOD, "r: q_hip differs between periods: is that the period?")
+    for doubts, said in (((), False), ((still,), False), ((still, doubt), True)):
         with pytest.raises(IdentificationError, match="negative in every joint") as raised:
-            identify(leg, replace(processed, warnings=doubts))
+            identify(leg, replace(processed, doubts=doubts))
         text = str(raised.value)
         assert ("Or is the period another one: r: q_hip differs" in text) == ("is the period" in text) == said
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         wrong = process(recording, leg, period=7.0)
-    assert any(text.endswith(PERIOD_DOUBT) for text in wrong.warnings)
+    assert set(texts_of(wrong.doubts, DoubtKind.PERIOD)) <= set(wrong.warnings) != set()
 
 
 @pytest.mark.parametrize(
