@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy import stats
+from scipy.optimize import brentq
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
@@ -24,8 +26,8 @@ from sea_ident.discrepancy.judge import (
     too_short,
 )
 from sea_ident.discrepancy.linear import whiten
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL
-from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, closed_freedom, unstacked
 from sea_ident.discrepancy.powers import with_its_power
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.search import Selection
@@ -49,8 +51,11 @@ NO_BETTER = 0.5
 """Where an effect explains nearly all and has not the form of what is there, one that leaves no more than this share
 more is no worse [-]."""
 
+DETECTED = 0.95
+"""Share of the cases in which an effect of the smallest size is found."""
+
 POWER_QUANTILE = 1.645
-"""Standard deviations that make 19 detections out of 20."""
+"""Standard deviations that make that share."""
 
 
 def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, ...]]:
@@ -141,6 +146,9 @@ def detectability(
 ) -> tuple[Detectability, ...]:
     """Smallest size of every candidate that would have been found, and what it is easily taken for.
 
+    It stands out of the noise floor, of the scatter of the periods along its own column, and matters to the torque: what
+    a search asks of an effect.
+
     Args:
         bench: the recording.
         fit: what was found.
@@ -153,7 +161,10 @@ def detectability(
         One entry for every candidate.
     """
     tests = max(sum(c.tests for c in candidates), 1)
-    steps = flat_steps(*judged) if judged[0].data.periods > 1 else np.zeros((0, 0))
+    several = bench.data.periods > 1
+    beside = flat_steps(*judged) if several else np.zeros((0, 0))
+    steps = flat_steps(bench, Settled(fit, noise)) if several else np.zeros((0, 0))
+    colours: ComplexArray = np.linalg.inv(bench.whitener(noise)).astype(np.complex128)
     candidates = [c for c in candidates if np.any(c.directions)]
     bases = [_orthonormal(c.directions) for c in candidates]
     labels = [c.effect.title for c in candidates]
@@ -166,12 +177,15 @@ def detectability(
     for i, candidate in enumerate(candidates):
         strength = np.linalg.norm(candidate.directions, axis=0)
         best = int(np.argmax(strength)) if len(strength) else 0
-        needed = _needed(candidate.columns, tests, noise)
-        smallest = needed / strength[best] if len(strength) and strength[best] > 0.0 else float("inf")
+        smallest = float("inf")
+        if len(strength) and strength[best] > 0.0:
+            own = candidate.directions[:, best]
+            needed = max(_needed(candidate.columns, tests, noise), _out_of_the_scatter(steps, own))
+            smallest = max(needed / strength[best], _that_matters(bench, colours, own))
         absorbed, effect = candidate.absorbed, candidate.effect
         if effect.name in LIVE_BESIDE_REVERSALS:
             effect = _usual(effect)
-            smallest, absorbed = _beside_reversals(judged, effect, tests, steps)
+            smallest, absorbed = _beside_reversals(judged, effect, tests, beside)
         mine = slice(starts[i], starts[i + 1])
         alike = []
         for k in range(len(candidates)):
@@ -198,6 +212,37 @@ def _needed(columns: int, tests: int, noise: NoiseFloor) -> float:
     """Size of an effect in units of the noise that stands out of it 19 times out of 20."""
     threshold = float(stats.f.isf(FAMILY_LEVEL / tests, columns, max(noise.total_freedom, 4.0)))
     return float(np.sqrt(threshold * columns)) + POWER_QUANTILE
+
+
+def _out_of_the_scatter(steps: FloatArray, column: FloatArray) -> float:
+    """Size of an effect that stands out of the scatter of the periods along its whitened column (M,) as often.
+
+    That is more than the noise floor says, one for all phases of a period, where noise gathers where the effect does,
+    and of few periods the scatter is not well known itself (power of Student's test, by its noncentral distribution).
+    """
+    if len(steps) < FEWEST_TO_SEARCH - 1:
+        return 0.0
+    return _size_for(closed_freedom(len(steps))) * spread(steps, column)
+
+
+@cache
+def _size_for(freedom: float) -> float:
+    """Size in standard deviations, known with such a freedom, that is told from the scatter 19 times out of 20."""
+    least = float(stats.t.isf(SCATTER_LEVEL / 2.0, freedom))
+    return float(brentq(lambda size: stats.nct.sf(least, freedom, size) - DETECTED, least, 3.0 * least))
+
+
+def _that_matters(bench: Bench, colours: ComplexArray, column: FloatArray) -> float:
+    """Size from which on what the model does not take up of a whitened column (M,) matters to the torque.
+
+    Args:
+        bench: the recording.
+        colours: (H + 1, E, E) what whitened numbers are to be multiplied by to be torques.
+        column: of unit size.
+    """
+    spectra = np.matmul(colours, unstacked(column, colours.shape[1])[:, :, None])[:, :, 0]
+    shares = np.sqrt(np.sum(np.abs(spectra) ** 2, axis=0)) / np.maximum(bench.torque_rms, 1e-300)
+    return SMALLEST_SHARE / float(shares.max())
 
 
 def _usual(effect: Effect) -> Effect:
@@ -229,10 +274,7 @@ def _beside_reversals(
     strength, power = float(np.linalg.norm(across)), float(np.sum(column**2))
     if not strength**2 > ABSORBED * power:
         return float("inf"), 1.0
-    size = _needed(1, tests, settled.noise)
-    if len(steps) >= FEWEST_TO_SEARCH - 1:
-        least = float(stats.t.isf(SCATTER_LEVEL / 2.0, closed_freedom(len(steps))))
-        size = max(size, (least + POWER_QUANTILE) * spread(steps, across))
+    size = max(_needed(1, tests, settled.noise), _out_of_the_scatter(steps, across))
     return size / strength, 1.0 - strength**2 / power
 
 

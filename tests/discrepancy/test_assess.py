@@ -6,16 +6,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import sea_ident
-from sea_ident.discrepancy.assess import no_worse, rivals
+from sea_ident.discrepancy.assess import _size_for, detectability, no_worse, rivals
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
-from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.next_effect import SCATTER_LEVEL
+from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.transfer import transfer
 from sea_ident.effects import base_effects, make_effect, spring_effects
@@ -215,3 +218,35 @@ def test_a_shape_that_the_first_motion_leaves_open_is_taken_as_the_other_has_it(
 def test_where_no_form_is_right_what_leaves_little_more_is_no_worse(statistic, gain, difference):
     fit = SimpleNamespace(statistic=statistic, unit=statistic / 600, excess=max(statistic - 600.0, 0.0))
     assert no_worse(fit, gain) == pytest.approx(difference)
+
+
+@pytest.mark.parametrize("freedom", [5.0, 14.0])
+def test_a_size_for_the_scatter_stands_out_of_it_nineteen_times_out_of_twenty(freedom):
+    """The scatter is an estimate, too: of few periods often too large."""
+    draws, rng = 20_000, np.random.default_rng(0)
+    told = (_size_for(freedom) + rng.standard_normal(draws)) / np.sqrt(rng.chisquare(freedom, draws) / freedom)
+    share = np.mean(told > stats.t.isf(SCATTER_LEVEL / 2.0, freedom))
+    assert share == pytest.approx(0.95, abs=4.0 * np.sqrt(0.95 * 0.05 / draws))
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("joint", ["hip", "knee", "ankle"])
+def test_an_effect_is_found_about_the_smallest_size_and_not_far_below(laboratory, jittery, joint):
+    """Friction that differs from pass to pass: its scatter asks for more than the noise floor does."""
+    bench = Bench(jittery, laboratory.effects)
+    start = settle(bench, bench.effects)
+    found = detectability(bench, start.fit, start.noise, scan(bench, start.fit, start.noise), (bench, start))
+    smallest = next(d.smallest for d in found if (d.effect, d.joint) == ("torque_offset", joint))
+    where = laboratory.leg.index(joint)
+
+    def named(times):
+        torque, mean = jittery.period_tau_motor.copy(), jittery.tau_motor.copy()
+        torque[:, :, where] += times * smallest
+        mean[:, where] += times * smallest
+        selection = search(
+            Bench(replace(jittery, period_tau_motor=torque, tau_motor=mean), laboratory.effects), bench.effects
+        )
+        return [effect.joint for effect in selection.effects]
+
+    assert named(1.5) == [joint]
+    assert named(0.3) == []
