@@ -12,7 +12,8 @@ from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.estimation import Agreement, Model
 from sea_ident.estimation.agreement import agreement
-from sea_ident.estimation.observations import friction_is_modelled
+from sea_ident.estimation.observations import Observations, friction_is_modelled
+from sea_ident.estimation.spring_agreement import SpringAgreement, spring_agreement
 from sea_ident.exceptions import RecordingError
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
@@ -40,6 +41,7 @@ class Validation:
         agreement: residual away from reversals beside its noise; None where one period says nothing of noise.
         warnings: what a user should know.
         units: (n,) unit of the torque of each joint.
+        springs: the law of every spring beside the torque that the dynamic model gives; empty where it tells none.
     """
 
     recording: str
@@ -55,6 +57,7 @@ class Validation:
     agreement: Agreement | None = None
     warnings: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    springs: tuple[SpringAgreement, ...] = ()
 
     def summary(self) -> str:
         """One line per joint."""
@@ -66,11 +69,12 @@ class Validation:
                 f"  {joint}: rms {self.rms[i]:.4g} of {self.rms_torque[i]:.4g} ({100 * self.nrms[i]:.2f} %), noise "
                 f"{self.noise_std[i]:.3g}{'' if away is None else away[i]}"
             )
+        lines.extend(f"  {spring.summary()}" for spring in self.springs)
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """rms, noise_std and nrms per joint, for `sea-ident validate --json`."""
+        """rms, noise_std and nrms per joint and spring, for `sea-ident validate --json`."""
         named = {"rms": self.rms, "noise_std": self.noise_std, "rms_torque": self.rms_torque, "nrms": self.nrms}
         record: dict[str, Any] = {
             key: {name: float(v) for name, v in zip(self.joint_names, values, strict=True)}
@@ -80,6 +84,7 @@ class Validation:
         return {
             **record,
             "agreement": away,
+            "springs": {spring.joint: spring.to_dict() for spring in self.springs},
             "samples": self.samples,
             "recording": self.recording,
             "warnings": list(self.warnings),
@@ -96,7 +101,7 @@ def validate(
     motor_harmonics: int | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Validation:
-    """Compare the torque that a model predicts with the torque that was measured.
+    """Compare the torque that a model predicts with the torque that was measured, and its springs with their torque.
 
     Where a column ``external_force_<joint>`` says that something pushed, those samples are left out.
 
@@ -129,7 +134,8 @@ def validate(
             recording, model.robot, period=period, link_harmonics=link_harmonics, motor_harmonics=motor_harmonics
         )
     tell("predicting the torque", 0.2)
-    predicted = model.predict(processed.motion, processed.channels)
+    observations = Observations(model.robot, model.effects, model.base, processed)
+    predicted = observations.rows @ model.values
     used = np.ones(processed.samples, dtype=bool)
     found = list(processed.warnings)
     if "external_force" in processed.channels:
@@ -146,9 +152,12 @@ def validate(
     rms = np.sqrt(np.mean(difference**2, axis=0))
     rms_torque = np.sqrt(np.mean(processed.tau_motor[used] ** 2, axis=0))
     each = []
-    for p, motion in enumerate(processed.period_motions):
-        tell(f"predicting period {p + 1} of {processed.periods}", 0.2 + 0.8 * p / processed.periods)
-        each.append(processed.period_tau_motor[p] - model.predict(motion, processed.channels))
+    for p, rows in enumerate(observations.each_period() if processed.period_motions else ()):
+        tell(f"predicting period {p + 1} of {processed.periods}", 0.2 + 0.6 * p / processed.periods)
+        each.append(processed.period_tau_motor[p] - rows.total @ model.values)
+    tell("comparing the springs", 0.8)
+    springs = spring_agreement(observations, model.values, model.springs, used)
+    found += [spring.warning for spring in springs if spring.warning]
     counted = friction_is_modelled(model.robot, model.effects, processed.motion) & used[:, None]
     noise = np.sqrt(processed.raw_tau_variance[used].mean(axis=0) / processed.periods)
     nrms = np.divide(rms, rms_torque, out=np.full_like(rms, np.inf), where=rms_torque > 0.0)
@@ -166,6 +175,7 @@ def validate(
         agreement=agreement(apart, np.array(each), counted),
         warnings=tuple(found),
         units=tuple(joint.torque_unit for joint in model.robot.joints),
+        springs=springs,
     )
 
 

@@ -146,8 +146,8 @@ def detectability(
 ) -> tuple[Detectability, ...]:
     """Smallest size of every candidate that would have been found, and what it is easily taken for.
 
-    It stands out of the noise floor, of the scatter of the periods along its own column, and matters to the torque: what
-    a search asks of an effect.
+    It stands out of the noise floor and of the scatter of the periods along its own column, and matters to the torque:
+    that is what a search asks of an effect.
 
     Args:
         bench: the recording.
