@@ -79,6 +79,23 @@ def test_an_excitation_of_other_joints_is_refused(leg_model, tmp_path):
     assert not (tmp_path / "r.html").exists()
 
 
+def test_the_springs_of_a_validation_are_on_the_page(page_text, validation):
+    assert len(validation.springs) == 3
+    table = page_text.split("less that of their law")[1].split("</table>")[0]
+    for spring in validation.springs:
+        cells = (spring.joint, number(spring.rms, 3), number(spring.noise_std, 3), number(100 * spring.nrms, 3))
+        row = next(part for part in table.split("<tr>") if f"<td>{spring.joint}</td>" in part)
+        assert re.findall(r"<td[^>]*>([^<]*)</td>", row)[:4] == list(cells)
+
+
+def test_a_spring_that_does_not_hold_elsewhere_is_a_finding(leg_model, validation):
+    first, *rest = validation.springs
+    wrong = replace(validation, springs=(replace(first, warning="the law leaves half"), *rest))
+    for given, said in ((validation, False), (wrong, True)):
+        found = Findings().context(Content(leg_model, validations=(given,)))
+        assert any("the law leaves half." in f.text for f in found["findings"]) == said
+
+
 def test_the_page_is_well_formed_small_and_refers_to_nothing_outside(page_text):
     page = Page(page_text)
     assert page.open == []

@@ -169,4 +169,6 @@ def _validations(joints: tuple[Joint, ...], content: Content) -> list[Finding]:
             text += "; away from reversals "
             text += f"beyond the noise: {', '.join(beyond)}" if beyond else "nothing stands out of the noise"
         found.append(Finding(level, "Prediction", f"{text}."))
+        warned = [spring.warning for spring in validation.springs if spring.warning]
+        found.extend(Finding("warn", "Prediction", f"{validation.recording}: {warning}.") for warning in warned)
     return found

@@ -47,5 +47,11 @@ class Validations(ModelSection):
                         joint.torque_unit,
                     )
                 )
-            groups.append({"name": validation.recording, "figures": figures, "rows": rows, "legend": chart.legend()})
+            springs = [(s.joint, s.rms, s.noise_std, 100 * s.nrms, s.unit) for s in validation.springs]
+            groups.append(
+                {
+                    "name": validation.recording, "figures": figures, "rows": rows, "springs": springs,
+                    "legend": chart.legend(),
+                }
+            )  # fmt: skip
         return {"groups": groups}
