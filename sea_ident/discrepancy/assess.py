@@ -181,7 +181,7 @@ def detectability(
         if len(strength) and strength[best] > 0.0:
             own = candidate.directions[:, best]
             needed = max(_needed(candidate.columns, tests, noise), _out_of_the_scatter(steps, own))
-            smallest = max(needed / strength[best], _that_matters(bench, colours, own))
+            smallest = max(needed / strength[best], _that_matters(bench, colours, own, candidate.effect.joint))
         absorbed, effect = candidate.absorbed, candidate.effect
         if effect.name in LIVE_BESIDE_REVERSALS:
             effect = _usual(effect)
@@ -232,17 +232,20 @@ def _size_for(freedom: float) -> float:
     return float(brentq(lambda size: stats.nct.sf(least, freedom, size) - DETECTED, least, 3.0 * least))
 
 
-def _that_matters(bench: Bench, colours: ComplexArray, column: FloatArray) -> float:
+def _that_matters(bench: Bench, colours: ComplexArray, column: FloatArray, joint: str | None) -> float:
     """Size from which on what the model does not take up of a whitened column (M,) matters to the torque.
 
     Args:
         bench: the recording.
         colours: (H + 1, E, E) what whitened numbers are to be multiplied by to be torques.
         column: of unit size.
+        joint: where the effect acts. What it does to the constants of other joints is there by the correlation of their
+            noise alone, which few periods tell badly; None where it acts on all.
     """
     spectra = np.matmul(colours, unstacked(column, colours.shape[1])[:, :, None])[:, :, 0]
     shares = np.sqrt(np.sum(np.abs(spectra) ** 2, axis=0)) / np.maximum(bench.torque_rms, 1e-300)
-    return SMALLEST_SHARE / float(shares.max())
+    own = [joint is None or equation.joint == joint for equation in bench.data.equations]
+    return SMALLEST_SHARE / max(float(shares[own].max()), 1e-300)
 
 
 def _usual(effect: Effect) -> Effect:

@@ -16,7 +16,7 @@ from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import tried
-from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
 from sea_ident.discrepancy.next_effect import SCATTER_LEVEL
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -229,24 +229,44 @@ def test_a_size_for_the_scatter_stands_out_of_it_nineteen_times_out_of_twenty(fr
     assert share == pytest.approx(0.95, abs=4.0 * np.sqrt(0.95 * 0.05 / draws))
 
 
+def smallest_offset(bench, joint):
+    """The smallest constant torque of a motor that is said to be found."""
+    start = settle(bench, bench.effects)
+    found = detectability(bench, start.fit, start.noise, scan(bench, start.fit, start.noise), (bench, start))
+    return next(d.smallest for d in found if (d.effect, d.joint) == ("torque_offset", joint))
+
+
+def with_offset(data, joint, size):
+    """The same passes with a constant more of the torque of a motor."""
+    torque, mean, where = data.period_tau_motor.copy(), data.tau_motor.copy(), data.robot.index(joint)
+    torque[:, :, where] += size
+    mean[:, where] += size
+    return replace(data, period_tau_motor=torque, tau_motor=mean)
+
+
+def test_the_smallest_size_matters_to_the_torque(laboratory, jittery, monkeypatch):
+    """What the model leaves of it at its joint is the share of the torque that is asked for."""
+    monkeypatch.setattr("sea_ident.discrepancy.assess.SMALLEST_SHARE", 0.05)
+    size = smallest_offset(Bench(jittery, laboratory.effects), "hip")
+    bench = Bench(with_offset(jittery, "hip", size), laboratory.effects)
+    before = settle(bench, bench.effects)
+    effects = (*before.fit.effects, make_effect("torque_offset", "hip"))
+    after = bench.fit(effects, before.noise, start=before.fit.parameters)
+    own = [equation.joint == "hip" for equation in jittery.equations]
+    # the noise moves the value that is found, and its floor is estimated anew
+    share = np.max(torque_changes(bench, before.fit, after)[own]) * size / after.values[-1]
+    assert share == pytest.approx(0.05, rel=0.1)
+
+
 @pytest.mark.scenario
 @pytest.mark.parametrize("joint", ["hip", "knee", "ankle"])
 def test_an_effect_is_found_about_the_smallest_size_and_not_far_below(laboratory, jittery, joint):
     """Friction that differs from pass to pass: its scatter asks for more than the noise floor does."""
-    bench = Bench(jittery, laboratory.effects)
-    start = settle(bench, bench.effects)
-    found = detectability(bench, start.fit, start.noise, scan(bench, start.fit, start.noise), (bench, start))
-    smallest = next(d.smallest for d in found if (d.effect, d.joint) == ("torque_offset", joint))
-    where = laboratory.leg.index(joint)
+    smallest = smallest_offset(Bench(jittery, laboratory.effects), joint)
 
     def named(times):
-        torque, mean = jittery.period_tau_motor.copy(), jittery.tau_motor.copy()
-        torque[:, :, where] += times * smallest
-        mean[:, where] += times * smallest
-        selection = search(
-            Bench(replace(jittery, period_tau_motor=torque, tau_motor=mean), laboratory.effects), bench.effects
-        )
-        return [effect.joint for effect in selection.effects]
+        bench = Bench(with_offset(jittery, joint, times * smallest), laboratory.effects)
+        return [effect.joint for effect in search(bench, bench.effects).effects]
 
     assert named(1.5) == [joint]
     assert named(0.3) == []

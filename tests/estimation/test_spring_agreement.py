@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from estimation.synthetic import leg_series, record, truth_of
+from sea_ident.effects import make_effect
 from sea_ident.estimation import identify
-from sea_ident.estimation.spring_result import Verdict
+from sea_ident.estimation.spring_result import SpringTerm, Verdict
 from sea_ident.robot import load_robot
 from sea_ident.validation import validate
 
@@ -75,6 +76,14 @@ def test_an_encoder_with_another_zero_is_told_of_the_springs_though_the_motor_to
     assert "another zero" in after.springs[1].warning
     weak = replace(model, springs=tuple(replace(s, verdict=Verdict.NOT_EXCITED) for s in model.springs))
     assert "load it more" in validate(weak, moved, period=10.0).springs[1].warning
+
+
+def test_what_else_is_in_a_spring_is_in_its_law(model, other):
+    """A constant of half a newton metre that is not there is what is left."""
+    hip, *rest = model.springs
+    more = replace(hip, terms=(SpringTerm(make_effect("spring_offset", "hip"), (0.5,), (0.01,)),))
+    left = springs(replace(model, springs=(more, *rest)), other, period=10.0)["hip"]
+    assert left.rms == pytest.approx(0.5, rel=0.01)
 
 
 def test_a_zero_that_was_fitted_is_kept(leg, other):
