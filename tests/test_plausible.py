@@ -7,7 +7,8 @@ import pytest
 from estimation.synthetic import leg_series, record, truth_of
 
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
-from sea_ident.processing import process
+from sea_ident.processing import filter_recording, process
+from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.processing.plausible import beyond_limits, doubts
 from sea_ident.recordings import Recording
 from sea_ident.robot import load_robot
@@ -164,3 +165,16 @@ def test_a_torque_sensor_is_checked_and_said_to_be_unused(leg, recording):
     assert "tau_spring_knee falls where the deflection rises" in said
     (said,) = found(leg, recording, tau_spring_knee=np.full(recording.samples, 3.0))
     assert "is the sensor dead" in said
+
+
+def test_a_doubt_keeps_its_kind_whether_the_motion_repeats_itself_or_not(leg, recording):
+    """What is concluded from a recording depends on it."""
+    changed = recording.replace_columns({"theta_knee": -recording.columns["theta_knee"]})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        for processed in (process(changed, leg, period=10.0), filter_recording(changed, leg)):
+            (text,) = texts_of(processed.doubts, DoubtKind.POSITION)
+            assert "theta_knee" in text
+            assert text in processed.warnings
+            assert texts_of(processed.doubts, DoubtKind.SENSOR) == ()
+        assert process(recording, leg, period=10.0).doubts == ()

@@ -158,4 +158,6 @@ def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_m
     assert any(text.startswith("held-out data: ") and "in degrees" in text for text in tested.warnings)
     assert any("cannot be used; nothing was tested on it" in text for text in tested.warnings)
     narrow = replace(leg, limits=replace(leg.limits, lower=leg.limits.lower + 50.0, upper=leg.limits.upper + 50.0))
-    assert sea_ident.diagnose(replace(intact_model, robot=narrow), training).verdict == "none"
+    doubtful = sea_ident.diagnose(replace(intact_model, robot=narrow), training, holdout=holdout)
+    assert doubtful.verdict == "none"
+    assert any("cannot be used; nothing was tested on it" in text for text in doubtful.warnings)

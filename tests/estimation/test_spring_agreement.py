@@ -8,7 +8,10 @@ import pytest
 from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.effects import make_effect
 from sea_ident.estimation import identify
+from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.spring_agreement import SpringAgreement, _with_warning, spring_agreement
 from sea_ident.estimation.spring_result import SpringTerm, Verdict
+from sea_ident.processing import process
 from sea_ident.robot import load_robot
 from sea_ident.validation import validate
 
@@ -93,6 +96,28 @@ def test_a_zero_that_was_fitted_is_kept(leg, other):
     assert model.springs[1].zero == pytest.approx(0.02, abs=1e-3)
     assert springs(model, moved, period=10.0)["knee"].nrms < 0.01
     assert springs(model, other, period=10.0)["knee"].warning
+
+
+def test_samples_that_do_not_count_are_left_out(leg, model, other):
+    processed = process(other, leg, period=10.0)
+    observations = Observations(leg, model.effects, model.base, processed)
+    half = np.arange(processed.samples) < processed.samples // 2
+    parts = [spring_agreement(observations, model.values, model.springs, used) for used in (half, ~half, half | ~half)]
+    torque = truth_of(leg, leg_series(seed=11)).tau_spring
+    for k in range(leg.n):
+        first, second, whole = (part[k] for part in parts)
+        for found, used in ((first, half), (second, ~half)):
+            assert found.rms_torque == pytest.approx(np.sqrt(np.mean(torque[used, k] ** 2)), rel=0.01)
+        for name in ("rms", "noise_std"):
+            powers = [getattr(found, name) ** 2 for found in (first, second)]
+            assert getattr(whole, name) ** 2 == pytest.approx(np.mean(powers), rel=1e-9)
+            assert powers[0] != powers[1]
+
+
+@pytest.mark.parametrize(("noise", "warned"), [(0.1, False), (0.05, True), (None, True)])
+def test_what_noise_explains_is_no_warning(noise, warned):
+    found = _with_warning(SpringAgreement("hip", 0.2, noise, 1.0, "N m"), Verdict.LINEAR)
+    assert bool(found.warning) == warned
 
 
 def test_without_laws_there_is_nothing_to_compare(model, other):
