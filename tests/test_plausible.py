@@ -178,3 +178,12 @@ def test_a_doubt_keeps_its_kind_whether_the_motion_repeats_itself_or_not(leg, re
             assert text in processed.warnings
             assert texts_of(processed.doubts, DoubtKind.SENSOR) == ()
         assert process(recording, leg, period=10.0).doubts == ()
+
+
+@pytest.mark.parametrize(("factor", "kind"), [(-1.0, DoubtKind.POSITION), (1.6, DoubtKind.SPRING)])
+def test_a_factor_that_nothing_explains_may_be_a_soft_spring(leg, recording, factor, kind):
+    """It is told, and conclusions are drawn all the same."""
+    changed = recording.replace_columns({"theta_knee": factor * recording.columns["theta_knee"]})
+    kinds = ("q", "theta", "tau_motor")
+    (doubt,) = doubts(changed, leg, *(changed.channel(k, leg.joint_names) for k in kinds))
+    assert doubt.kind is kind

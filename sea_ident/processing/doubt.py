@@ -12,6 +12,8 @@ class DoubtKind(StrEnum):
     POSITION = "position"
     """A position is in another unit, of another joint or another side of the gear, or a joint that the model holds is
     not held: the model then moves another way than the robot did."""
+    SPRING = "spring"
+    """Motor and link of a joint move as a stiff spring would not let them."""
     TORQUE = "torque"
     SENSOR = "sensor"
     """An encoder stood still or lost counts for a while."""

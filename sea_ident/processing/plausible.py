@@ -58,7 +58,7 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
         doubt(DoubtKind.TORQUE, _torque(recording, joint, robot.limits.torque[i], torque[:, i]))
         sensors = [(f"q_{joint.name}", q[:, i])]
         if joint.elastic:
-            doubt(DoubtKind.POSITION, _slope(joint, q[:, i], theta[:, i]))
+            doubt(*_slope(joint, q[:, i], theta[:, i]))
             if recording.has("tau_spring", joint.name):
                 measured = recording.channel("tau_spring", [joint.name])[:, 0]
                 doubt(DoubtKind.TORQUE, _sensor(joint, measured, theta[:, i] - q[:, i]))
@@ -150,15 +150,20 @@ def _torque(recording: Recording, joint: Joint, limit: float, torque: FloatArray
     ]
 
 
-def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> list[str]:
-    """Whether motor and link move as far: theta is meant after the gear, in the unit and sense of q."""
+def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> tuple[DoubtKind, list[str]]:
+    """Whether motor and link move as far: theta is meant after the gear, in the unit and sense of q.
+
+    With a factor that is that of a unit, a sign or a gear, one of the two is wrong; with any other it may be a spring
+    that is as soft as that.
+    """
+    soft = DoubtKind.SPRING
     power, other = float(np.var(q)), float(np.var(theta))
     if np.ptp(q) == 0.0 or np.ptp(theta) == 0.0 or joint.actuator is None:
-        return []  # said elsewhere
+        return soft, []  # said elsewhere
     covariance = float(np.mean((q - q.mean()) * (theta - theta.mean())))
     slope, correlation = covariance / power, covariance / np.sqrt(power * other)
     if abs(slope - 1.0) <= ALIKE:
-        return []
+        return soft, []
     column, ratio, turn = f"theta_{joint.name}", joint.actuator.gear_ratio, 180.0 / np.pi
     where = f"{column} moves {slope:.4g} times as far as q_{joint.name}"
     causes = {
@@ -170,8 +175,8 @@ def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> list[str]:
     }
     for factor, (question, name, setting) in causes.items():
         if abs(slope / factor - 1.0) <= RECOGNISED and abs(correlation) > 0.7:
-            return [f"{where}: {question} Then {_say(name, setting)}"]
-    return [
+            return DoubtKind.POSITION, [f"{where}: {question} Then {_say(name, setting)}"]
+    return soft, [
         f"{where}, correlation {correlation:.2f}: are both of this joint, in one unit, and theta after the gear? The "
         "spring is between them, and all that is identified rests on it"
     ]
