@@ -228,8 +228,6 @@ def _settles(bench: Bench, fit: Fit, noise: NoiseFloor, space: FloatArray, direc
     """Whether the first period differs from the later ones, and these do not go on with it."""
     middle: FloatArray = bench.data.starts + 0.5 * bench.data.period
     inside = inside_of_periods(bench, fit, noise)
-    if _omnibus(inside, middle, noise) < LEVEL < _omnibus(inside[1:], middle[1:], noise):
-        return True
     numbers = inside @ space
     first = best_trend(numbers, directions, middle, noise)
     differs = min(first.p_value, _apart(inside[0], inside[1:])) < LEVEL
