@@ -20,6 +20,7 @@ STANDS_LONG = 0.1
 """Share of the samples of a joint that are not compared from which on a user is warned; usual are 2 to 6 % [-]."""
 
 UNSOUND = "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."
+"""What is said of a recording that allows no conclusion."""
 
 DISAGREES = 1e-3
 """Probability of the lack of fit by noise below which model and data are said to disagree."""

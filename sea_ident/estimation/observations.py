@@ -223,3 +223,9 @@ class Observations:
         if self.spring_side is SpringSide.MOTOR:
             torque = torque + tau_motor[:, self.robot.elastic_indices]
         return torque
+
+    def spring_torque_of_periods(self, values: FloatArray) -> Iterator[tuple[Motion, FloatArray]]:
+        """Motion of every period, and the (N, m) spring torque with it by parameters (b,) [N m]."""
+        processed = self.processed
+        periods = zip(processed.period_motions, self.each_period(), processed.period_tau_motor, strict=True)
+        return ((motion, self.spring_torque(rows, torque, values)) for motion, rows, torque in periods)

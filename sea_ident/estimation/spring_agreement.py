@@ -1,7 +1,7 @@
 """Springs on a recording that was not used to find them: their law beside the torque that the dynamic model gives."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.spring_result import SpringResult, Verdict
+from sea_ident.estimation.springs import spring_columns
 from sea_ident.motion import Motion
 
 WRONG = 0.1
@@ -93,12 +94,7 @@ def spring_agreement(
     mean = left(processed.motion, torque)[used]
     noise = None
     if processed.period_motions:
-        each = [
-            left(motion, observations.spring_torque(rows, tau, values))[used]
-            for motion, rows, tau in zip(
-                processed.period_motions, observations.each_period(), processed.period_tau_motor, strict=True
-            )
-        ]
+        each = [left(motion, own)[used] for motion, own in observations.spring_torque_of_periods(values)]
         noise = np.sqrt(np.var(each, axis=0, ddof=1).mean(axis=0) / len(each))
     found = []
     for spring in springs:
@@ -117,14 +113,10 @@ def spring_agreement(
 
 def _by_law(spring: SpringResult, motion: Motion, joint: int) -> FloatArray:
     """(N,) torque of a spring by its law and what else was found in it."""
-    theta, dtheta = motion.theta[:, joint] - spring.zero, motion.dtheta[:, joint]
-    q, dq = motion.q[:, joint], motion.dq[:, joint]
-    stiffness, cubic, damping = spring.law
-    torque = stiffness * (theta - q) + cubic * (theta - q) ** 3 + damping * (dtheta - dq)
-    for term in spring.terms:
-        if isinstance(term.effect, JointEffect):
-            torque = torque + term.effect.local_columns(q, dq, theta, dtheta) @ np.asarray(term.values)
-    return np.asarray(torque, dtype=np.float64)
+    inside = [(term.effect, term.values) for term in spring.terms if isinstance(term.effect, JointEffect)]
+    columns = spring_columns(motion, joint, spring.zero, [effect for effect, _ in inside])
+    torque: FloatArray = columns @ np.concatenate([spring.law, *(values for _, values in inside)])
+    return torque
 
 
 def _with_warning(found: SpringAgreement, verdict: Verdict) -> SpringAgreement:
@@ -141,4 +133,4 @@ def _with_warning(found: SpringAgreement, verdict: Verdict) -> SpringAgreement:
         f"the law of the spring of {found.joint!r} leaves {100 * found.nrms:.3g} % of its torque ({found.rms:.3g} of "
         f"{found.rms_torque:.3g} {found.unit} rms): {why}"
     )
-    return SpringAgreement(found.joint, found.rms, found.noise_std, found.rms_torque, found.unit, text)
+    return replace(found, warning=text)

@@ -90,13 +90,8 @@ def springs_from(
     per_period = None
     if processed.periods > 1 and len(uncertainty.influences) == processed.periods:
         per_period = [
-            (
-                corrected_motion(robot, observations.effects, own_motion),
-                observations.spring_torque(rows, torque, values),
-            )
-            for own_motion, rows, torque in zip(
-                processed.period_motions, observations.each_period(), processed.period_tau_motor, strict=True
-            )
+            (corrected_motion(robot, observations.effects, own_motion), torque)
+            for own_motion, torque in observations.spring_torque_of_periods(values)
         ]
     results = []
     for k, joint in enumerate(elastic):
@@ -175,10 +170,7 @@ class _SpringData:
 
     def columns(self, motion: Motion, zero: float) -> FloatArray:
         """(N, 3 + k) columns of K1, K3, D and of the other effects."""
-        i = self.joint
-        state = (motion.q[:, i], motion.dq[:, i], motion.theta[:, i] - zero, motion.dtheta[:, i])
-        more = [effect.local_columns(*state) for effect in self.effects]
-        return np.column_stack([_columns(motion, i, zero), *more])
+        return spring_columns(motion, self.joint, zero, self.effects)
 
     def left_in_periods(self, values: FloatArray, zero: float) -> FloatArray | None:
         """(P, N) what values (3 + k,) leave of the torque of every period; None without periods."""
@@ -187,17 +179,27 @@ class _SpringData:
         return np.stack([tau - self.columns(motion, zero) @ values for motion, tau in self.per_period])
 
 
-def _columns(motion: Motion, joint: int, zero: float) -> FloatArray:
-    """(N, 3) columns of K1, K3, D."""
-    d = motion.deflection[:, joint] - zero
-    return np.column_stack([d, d**3, motion.deflection_rate[:, joint]])
+def spring_columns(motion: Motion, joint: int, zero: float, effects: Sequence[JointEffect] = ()) -> FloatArray:
+    """(N, 3 + k) columns of K1, K3, D of the spring of a joint and of further effects in it.
+
+    Args:
+        motion: (N, n), as the bodies and the motor move.
+        joint: number of the joint.
+        zero: difference of the zeros of theta and q [rad] or [m].
+        effects: what else is in the spring.
+    """
+    q, dq = motion.q[:, joint], motion.dq[:, joint]
+    theta, dtheta = motion.theta[:, joint] - zero, motion.dtheta[:, joint]
+    deflection = theta - q
+    law = [deflection, deflection**3, dtheta - dq]
+    return np.column_stack([*law, *(effect.local_columns(q, dq, theta, dtheta) for effect in effects)])
 
 
 def _fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
     """The difference of zeros for which the odd law fits best: Newton's steps on the offset."""
     zero = float(np.mean(motion.deflection[:, joint]))
     for _ in range(50):
-        columns = _columns(motion, joint, zero)
+        columns = spring_columns(motion, joint, zero)
         values = np.linalg.lstsq(columns, tau, rcond=None)[0]
         d = columns[:, 0]
         slope = values[0] + 3.0 * values[1] * d**2

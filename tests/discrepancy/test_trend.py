@@ -191,6 +191,22 @@ def test_what_is_not_known_at_the_ends_of_a_recording_is_no_start_that_settles(n
     assert "the first period differs" in differing(np.roll(ends, 300, axis=0), 40.0)[0]
 
 
+def test_friction_that_is_another_in_the_first_period_alone_is_a_start(nothing_missing):
+    """Too little of the residual to set that period apart as a whole, but the pattern of one effect."""
+    bench, _ = nothing_missing
+    data, knee = bench.data, bench.robot.index("knee")
+
+    def started(size, period):
+        torque = data.period_tau_motor.copy()
+        torque[period, :, knee] += size * np.tanh(data.period_motions[period].dtheta[:, knee] / 0.02)
+        changed = Bench(replace(data, period_tau_motor=torque, tau_motor=torque.mean(axis=0)), bench.effects)
+        return bool(compared(changed).notes)
+
+    assert started(0.2, 0)
+    assert not started(0.02, 0)
+    assert not started(0.2, 1)
+
+
 def test_three_periods_show_no_trend(laboratory):
     assert compared(laboratory.bench(laboratory.record(periods=3))).p_value == 1.0
 

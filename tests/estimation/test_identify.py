@@ -58,7 +58,9 @@ def test_a_period_in_doubt_is_told_where_every_sign_seems_wrong(leg, truth):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         wrong = process(recording, leg, period=7.0)
-    assert set(texts_of(wrong.doubts, DoubtKind.PERIOD)) <= set(wrong.warnings) != set()
+    doubted = texts_of(wrong.doubts, DoubtKind.PERIOD)
+    assert doubted
+    assert set(doubted) <= set(wrong.warnings)
 
 
 @pytest.mark.parametrize(

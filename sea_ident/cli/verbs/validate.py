@@ -12,7 +12,7 @@ def validate(
     column: ForeignColumns = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare the torque that a model predicts with a recording.
+    """Compare the torque that a model predicts with a recording, and its springs with their torque.
 
     The recording should be one that was not used to find the model.
     """
