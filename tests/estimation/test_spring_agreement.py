@@ -98,6 +98,13 @@ def test_a_zero_that_was_fitted_is_kept(leg, other):
     assert springs(model, other, period=10.0)["knee"].warning
 
 
+def test_an_error_of_an_encoder_that_the_model_knows_is_none_of_its_spring(model, other):
+    moved = other.replace_columns({"q_knee": other.columns["q_knee"] + 0.02})
+    knows = replace(model, effects=(*model.effects, make_effect("encoder_offset", "knee", offset=0.02)))
+    assert springs(model, moved, period=10.0)["knee"].warning
+    assert springs(knows, moved, period=10.0)["knee"].nrms < 5e-3
+
+
 def test_samples_that_do_not_count_are_left_out(leg, model, other):
     processed = process(other, leg, period=10.0)
     observations = Observations(leg, model.effects, model.base, processed)
