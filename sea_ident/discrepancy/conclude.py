@@ -138,6 +138,8 @@ def conclude(
         kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted),
         standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)),
     )  # fmt: skip
+    # what follows from such positions is no further fault of the recording
+    warnings = (*notes.warnings, *trends.notes, *words.reservations(facts))
     found = Diagnosis(
         verdict=verdict,
         text=words.paragraph(facts),
@@ -149,7 +151,7 @@ def conclude(
         training=gap,
         holdout=held_gap,
         detectability=assess.detectability(bench, final.fit, final.noise, selection.candidates, judged),
-        warnings=tuple(dict.fromkeys((*notes.warnings, *trends.notes, *words.reservations(facts)))),
+        warnings=tuple(dict.fromkeys(bench.data.warnings if doubted else warnings)),
         waveforms=_waveforms(bench, start.fit, final.fit, final.noise, selection),
         recording=bench.data.source,
         holdout_source=None if held is None else held.source,

@@ -174,7 +174,8 @@ def diagnose_unrepeated(
         units=torque_units(robot),
     )  # fmt: skip
     if texts_of(processed.doubts, DoubtKind.POSITION):
-        diagnosis = without_sizes(replace(diagnosis, verdict=Verdict.CANNOT_TELL, text=words.UNSOUND))
+        unsound = replace(diagnosis, verdict=Verdict.CANNOT_TELL, text=words.UNSOUND, warnings=processed.warnings)
+        diagnosis = without_sizes(unsound)
     for text in diagnosis.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
     return diagnosis

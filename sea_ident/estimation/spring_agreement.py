@@ -12,6 +12,7 @@ from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.spring_result import SpringResult, Verdict
 from sea_ident.estimation.springs import spring_columns
 from sea_ident.motion import Motion
+from sea_ident.processing.doubt import DoubtKind, texts_of
 
 WRONG = 0.1
 """Share of the torque of a spring that its law leaves from which on a user is warned [-], ..."""
@@ -97,6 +98,8 @@ def spring_agreement(
         each = [left(motion, own)[used] for motion, own in observations.spring_torque_of_periods(values)]
         noise = np.sqrt(np.var(each, axis=0, ddof=1).mean(axis=0) / len(each))
     found = []
+    # what follows from positions in another unit is no fault of a spring
+    doubted = texts_of(processed.doubts, DoubtKind.POSITION)
     for spring in springs:
         joint = robot.index(spring.joint)
         k = places[joint]
@@ -107,7 +110,7 @@ def spring_agreement(
             float(np.sqrt(np.mean(torque[used, k] ** 2))),
             robot.joints[joint].torque_unit,
         )
-        found.append(_with_warning(plain, spring.verdict))
+        found.append(plain if doubted else _with_warning(plain, spring.verdict))
     return tuple(found)
 
 

@@ -152,6 +152,8 @@ def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_m
         found = sea_ident.diagnose(model, recording)
         assert (found.verdict, found.missing, found.model) == ("cannot_tell", (), None)
         assert "the warnings say what" in found.text
+        # what follows from them is not told as well
+        assert all("q_knee" in text or "no period" in text or "one period" in text for text in found.warnings)
         assert any("q_knee goes from" in text and "is it in degrees?" in text for text in found.warnings)
     tested = sea_ident.diagnose(intact_model, training, holdout=in_degrees(holdout))
     assert tested.verdict == "none"

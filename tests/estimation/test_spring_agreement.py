@@ -81,6 +81,14 @@ def test_an_encoder_with_another_zero_is_told_of_the_springs_though_the_motor_to
     assert "load it more" in validate(weak, moved, period=10.0).springs[1].warning
 
 
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_spring_is_not_blamed_for_positions_in_another_unit(model, other):
+    knee = {f"{kind}_knee": np.degrees(other.columns[f"{kind}_knee"]) for kind in ("q", "theta")}
+    validation = validate(model, other.replace_columns(knee), period=10.0)
+    assert any("is it in degrees?" in text for text in validation.warnings)
+    assert all(spring.nrms > 0.1 and spring.warning == "" for spring in validation.springs)
+
+
 def test_what_else_is_in_a_spring_is_in_its_law(model, other):
     """A constant of half a newton metre that is not there is what is left."""
     hip, *rest = model.springs
