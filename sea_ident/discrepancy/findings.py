@@ -244,7 +244,7 @@ class Detectability:
         effect: name.
         joint: joint.
         smallest: smallest value that would stand out of the noise and of the scatter of the passes 19 times out of 20
-            and matter to the torque; a name may ask for somewhat more, for it must hold on other data, too.
+            and matter to the torque; a name may ask for twice as much, for it must hold on other data, too.
         unit: its unit.
         absorbed: share of the effect that the other parameters absorb [-].
         confusable_with: effects (`name` or `name at joint`) that look like it in this motion.
