@@ -1,7 +1,6 @@
 """What all tests share: one thread for each of the processes that pytest starts, and the command line without one."""
 
 import os
-import signal
 import sys
 import warnings
 from dataclasses import dataclass
@@ -42,13 +41,8 @@ def call_here(monkeypatch, capsys):
     def call(*arguments: object, cwd) -> Answer:
         monkeypatch.setattr(sys, "argv", ["sea-ident", *map(str, arguments)])
         monkeypatch.chdir(cwd)
-        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
-                main()
-        finally:
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
+        with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
+            main()
         code = ended.value.code
         return Answer(code if isinstance(code, int) else int(code is not None), *capsys.readouterr())
 

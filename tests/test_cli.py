@@ -1,6 +1,7 @@
 """The command line, called as users and other programs call it: as a process of its own."""
 
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -218,6 +219,13 @@ def test_a_report_needs_the_model_file_only(chain):
     text = (chain[0] / "again.html").read_text()
     assert 'id="excitation"' in text
     assert 'id="torque"' in text
+
+
+def test_called_by_a_program_it_leaves_the_signals_of_that_as_they_were(call_here, tmp_path):
+    """Else a pool of workers that the program forks later does not end when it is told to."""
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    assert call_here("inspect", "nothing.urdf", cwd=tmp_path).returncode == 2
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,16 @@
 """What `sea-ident diagnose` writes beside the diagnosis."""
 
-import sys
 from types import SimpleNamespace
 
 import pytest
 
-from sea_ident.cli import main
 from sea_ident.discrepancy import Diagnosis, LackOfFit, NextExperiment, Verdict
 from sea_ident.excitation import design_excitation, read_excitation
 from sea_ident.robot import load_robot
 
 
 @pytest.fixture
-def told(monkeypatch, tmp_path):
+def told(monkeypatch, tmp_path, call_here):
     """Runs the verb with a diagnosis that is given."""
 
     def run(diagnosis, *more):
@@ -20,23 +18,20 @@ def told(monkeypatch, tmp_path):
         monkeypatch.setattr("sea_ident.recordings.read_recording", lambda path, columns=None: SimpleNamespace())
         monkeypatch.setattr("sea_ident.discrepancy.diagnose", lambda *args, **options: diagnosis)
         words = ["diagnose", "model.json", "rec.csv", "--out", "d.json", "--next", "next.json", *more]
-        monkeypatch.setattr(sys, "argv", ["sea-ident", *words])
-        monkeypatch.chdir(tmp_path)
-        with pytest.raises(SystemExit) as done:
-            main()
-        assert not done.value.code
+        answer = call_here(*words, cwd=tmp_path)
+        assert answer.returncode == 0, answer.stderr
+        return answer
 
     return run
 
 
-def test_the_next_experiment_is_an_excitation_like_any_other(told, tmp_path, capsys):
+def test_the_next_experiment_is_an_excitation_like_any_other(told, tmp_path):
     excitation = design_excitation(load_robot("quanser_2dof"), harmonics=2, starts=1, seed=1)
     found = Diagnosis(
         Verdict.AMBIGUOUS, "A or B.", LackOfFit(0.0, 1, 1.0, 1.0, {}),
         next_experiment=NextExperiment(("a at stage1", "b at stage1"), excitation.to_dict(), 3.0),
     )  # fmt: skip
-    told(found)
-    assert "written: d.json, next.json" in capsys.readouterr().out
+    assert "written: d.json, next.json" in told(found).stdout
     again = read_excitation(tmp_path / "next.json")
     assert again.to_dict() == excitation.to_dict()
     assert list(tmp_path.glob("*.part*")) == []
@@ -50,20 +45,20 @@ def test_the_next_experiment_is_an_excitation_like_any_other(told, tmp_path, cap
         (Verdict.AMBIGUOUS, "no motion was found that tells the effects apart better"),
     ],
 )
-def test_without_a_next_experiment_none_is_written_and_that_is_said(told, tmp_path, capsys, verdict, reason):
-    told(Diagnosis(verdict, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {})))
+def test_without_a_next_experiment_none_is_written_and_that_is_said(told, tmp_path, verdict, reason):
+    answer = told(Diagnosis(verdict, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {})))
     assert not (tmp_path / "next.json").exists()
-    out, err = capsys.readouterr()
+    out, err = answer.stdout, answer.stderr
     assert f"warning: next.json is not written: {reason}" in err
     assert "older" not in err
     assert out.endswith("written: d.json\n")
 
 
-def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path, capsys):
+def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path):
     """Else what an earlier diagnosis proposed passes for what this one does."""
     (tmp_path / "next.json").write_text("before")
-    told(Diagnosis(Verdict.NAMED, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {})), "--model-out", "m.json")
+    answer = told(Diagnosis(Verdict.NAMED, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {})), "--model-out", "m.json")
     assert (tmp_path / "next.json").read_text() == "before"
-    older, model = (line for line in capsys.readouterr().err.splitlines()[::-1])
+    older, model = (line for line in answer.stderr.splitlines()[::-1])
     assert older.endswith("; the file of that name is an older one")
     assert model == "warning: m.json is not written: the verdict named comes without a repaired model"

@@ -64,8 +64,15 @@ def main() -> None:
     warnings.simplefilter("once", SeaIdentWarning)
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     # A polite kill unwinds like Ctrl-C, so that temporary files are removed.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    before = {number: signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        _run()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+
+
+def _run() -> None:
     try:
         try:
             app(prog_name="sea-ident")

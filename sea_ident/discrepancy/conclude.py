@@ -243,16 +243,21 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
+    # what drifts is in the mean too, where all that changes is known
+    drifts = bool(trends.trends) and not trends.unnamed
+    if not holds:
+        return Verdict.SUSPECT
+    if large and unexplained > UNEXPLAINED_BY_FRICTION and not drifts and bench.data.periods >= FEWEST_PERIODS:
+        # whether what is nearest holds on other data or not
+        return Verdict.NOT_IN_LIBRARY
     least = TRANSFERS_ALONE if len(structural) == 1 else TRANSFERS
-    if not holds or any(m.transfer is not None and m.transfer <= least for m in structural):
+    if any(m.transfer is not None and m.transfer <= least for m in structural):
         return Verdict.SUSPECT
     if remainder > LARGEST_LEFT and bench.data.periods < FEWEST_PERIODS:
         return Verdict.CANNOT_TELL
     # beside a friction that the model did not have at all more is left: finer effects come after it
     basic = all(m.effect in BASIC for m in structural) and any(m.effect in FRICTION for m in structural)
     nameless = remainder > WORTH_A_NAME and not basic
-    # what drifts is in the mean too, where all that changes is known
-    drifts = bool(trends.trends) and not trends.unnamed
     unlike = unexplained > (UNEXPLAINED_BY_FRICTION if basic else UNEXPLAINED)
     if large and (unlike or nameless) and not drifts:
         return Verdict.NOT_IN_LIBRARY

@@ -242,7 +242,7 @@ def _tested(
     if held is None or not held.other_motion:
         return confirmed, declared(alternatives), held, notes
     constant, slipping = (confirmed.selection.joints_of(kind) for kind in (SpringOffset, SpringHysteresis))
-    if all(transfer.holds for transfer in held.transfers) and beyond_the_library(confirmed, trends):
+    if beyond_the_library(confirmed, trends):
         alternatives = declared(alternatives)
     elif alternatives:
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)

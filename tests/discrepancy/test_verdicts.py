@@ -169,7 +169,13 @@ def test_every_verdict_follows_from_findings():
     assert verdict([effect], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.NAMED_WITH_REMAINDER
     assert verdict([effect], remainder=0.01, unexplained=0.6, trends=LeavesAnother) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
-    assert verdict([replace(effect, transfer=0.1)]) is Verdict.SUSPECT
+    weak = replace(effect, transfer=0.1)
+    assert verdict([weak]) is Verdict.SUSPECT
+    # so much is left that the library does not have it, whether what is nearest holds on other data or not
+    assert verdict([weak], remainder=0.01, unexplained=0.45) is Verdict.SUSPECT
+    assert verdict([weak], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
+    assert verdict([weak], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.SUSPECT
+    assert verdict([weak], remainder=0.01, unexplained=0.6, holds=False) is Verdict.SUSPECT
     # what else is missing may spoil one of several, but not one that is alone
     assert verdict([replace(effect, transfer=0.65)]) is Verdict.SUSPECT
     assert verdict([replace(effect, transfer=0.75)]) is Verdict.NAMED
