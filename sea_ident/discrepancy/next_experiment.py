@@ -8,8 +8,8 @@ of each in the noise of the recording, the worse of both counting.
 """
 
 import warnings as python_warnings
-from collections.abc import Sequence
-from contextlib import closing, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,6 @@ from sea_ident.exceptions import SeaIdentError
 from sea_ident.excitation import Criterion, Discrimination, DOptimality, Excitation, PredictedMotors, design_excitation
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.robot import Robot
-from sea_ident.side_by_side import side_by_side
 from sea_ident.simulation import plant_from_identified
 
 HARMONICS = 6
@@ -75,13 +74,7 @@ class Pair:
     @property
     def names(self) -> tuple[str, str]:
         """Both, as `name at joint`."""
-        own, rival = self.effects
-        return own.title, rival.title
-
-    @property
-    def effects(self) -> tuple[Effect, Effect]:
-        """Both."""
-        return self.own.effects[self.own_position], self.rival.effects[self.rival_position]
+        return self.own.effects[self.own_position].title, self.rival.effects[self.rival_position].title
 
 
 def ambiguous_pairs(selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]) -> list[Pair]:
@@ -109,19 +102,14 @@ def propose(
     robot, motors = _identified(model)
     best: tuple[float, list[float], Excitation] | None = None
     reasons: list[str] = []
-    plans = _plans(robot, pairs[0])
-    with closing(side_by_side(_Design(robot, motors, bench, noise, pairs[0]), plans)) as designs:
-        for excitation in designs:
-            if isinstance(excitation, str):
-                reasons.append(excitation)
-                continue
-            other = Bench(_data_of(bench.data, robot, excitation.series, motors), bench.effects)
-            there = [separation(other, noise, pair) for pair in pairs]
-            score = float(np.sum(np.log(np.maximum(there, 1.0))))
-            if best is None or score > best[0]:
-                best = (score, there, excitation)
-            if min(there) > PLENTY:
-                break
+    for excitation in _designs(robot, motors, bench, noise, pairs[0], reasons):
+        other = Bench(_data_of(bench.data, robot, excitation.series, motors), bench.effects)
+        there = [separation(other, noise, pair) for pair in pairs]
+        score = float(np.sum(np.log(np.maximum(there, 1.0))))
+        if best is None or score > best[0]:
+            best = (score, there, excitation)
+        if min(there) > PLENTY:
+            break
     first, second = pairs[0].names
     if best is None:
         return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
@@ -163,74 +151,44 @@ def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: F
     return float(signal @ signal)
 
 
-@dataclass(frozen=True, eq=False)
-class _Plan:
-    """A motion that is to be designed.
-
-    Attributes:
-        criterion: what it is designed for.
-        effects: the model whose columns count; None for that of the robot.
-        seed: of its start.
-    """
-
-    criterion: Criterion
-    effects: tuple[Effect, ...] | None
-    seed: int
-
-
-def _plans(robot: Robot, pair: Pair) -> list[_Plan]:
-    """A motion for the columns of a pair, then motions that are wide in all.
+def _designs(
+    robot: Robot,
+    motors: PredictedMotors | None,
+    bench: Bench,
+    noise: NoiseFloor,
+    pair: Pair,
+    reasons: list[str],
+) -> Iterator[Excitation]:
+    """Motions designed for the columns of a pair, then motions that are wide in all.
 
     Effects that show only beyond some border (play, the end of a range) have no slope to follow where a design starts.
     """
-    plans = [_Plan(DOptimality(), None, seed) for seed in SEEDS]
-    own, rival = pair.effects
+    known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
+    own, rival = pair.own.effects[pair.own_position], pair.rival.effects[pair.rival_position]
+    rows = _row_noise(bench, noise)
+    plans: list[tuple[Criterion, Sequence[Effect] | None, int]] = [(DOptimality(), None, seed) for seed in SEEDS]
     if own.columns(robot) and rival.columns(robot):
-        known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
-        plans.insert(0, _Plan(Discrimination(own, (rival,)), known, SEEDS[0]))
-    return plans
-
-
-@dataclass(frozen=True, eq=False)
-class _Design:
-    """Designs motions inside all limits of a robot.
-
-    Attributes:
-        robot: with the bodies and the springs of the model.
-        motors: where its motors are on a motion of the links; None where that is not known.
-        bench: the recording that does not tell a pair apart.
-        noise: its noise floor.
-        pair: the pair.
-    """
-
-    robot: Robot
-    motors: PredictedMotors | None
-    bench: Bench
-    noise: NoiseFloor
-    pair: Pair
-
-    def __call__(self, plan: _Plan) -> Excitation | str:
-        """The motion, or why there is none."""
-        effects = plan.effects
-        springs = effects is not None and any(e.side is Side.SPRING for e in (*effects, *self.pair.effects))
+        plans.insert(0, (Discrimination(own, (rival,)), known, SEEDS[0]))
+    for criterion, effects, seed in plans:
+        springs = effects is not None and any(e.side is Side.SPRING for e in (*effects, own, rival))
         try:
             with python_warnings.catch_warnings():
                 python_warnings.simplefilter("ignore")
-                return design_excitation(
-                    self.robot,
-                    base_frequency=1.0 / self.bench.data.period,
+                yield design_excitation(
+                    robot,
+                    base_frequency=1.0 / bench.data.period,
                     harmonics=HARMONICS,
                     starts=STARTS,
-                    seed=plan.seed,
-                    criterion=plan.criterion,
+                    seed=seed,
+                    criterion=criterion,
                     effects=effects,
-                    motors=self.motors if springs else None,
-                    noise=_row_noise(self.bench, self.noise) if springs else None,
-                    rate=_rate(self.bench),
+                    motors=motors if springs else None,
+                    noise=rows if springs else None,
+                    rate=_rate(bench),
                     jobs=1,
                 )
         except (SeaIdentError, np.linalg.LinAlgError) as error:
-            return str(error)
+            reasons.append(str(error))
 
 
 def _rate(bench: Bench) -> float:
