@@ -118,6 +118,7 @@ def test_fewer_than_ten_periods_are_not_looked_at(nothing_missing):
     assert confirmed.beside is None
 
 
+@pytest.mark.scenario
 def test_what_is_said_to_be_the_smallest_belongs_to_a_shape(least):
     assert least.shapes == (("speed", 0.1, "rad/s"), ("exponent", 2.0, "-"))
 
@@ -142,6 +143,7 @@ def test_where_what_is_left_may_be_chance_nothing_is_looked_for_but_in_the_passe
     assert named(confirmed.selection) == seen
 
 
+@pytest.mark.scenario
 def test_what_lets_a_motor_go_late_is_stiction_where_the_mean_shows_a_trace_of_it(laboratory, monkeypatch):
     """By the passes, not by the mean: and only where the mean does not speak against it."""
     late = {"knee": 1e-12}

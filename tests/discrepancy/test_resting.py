@@ -113,7 +113,7 @@ def test_what_is_no_constant_of_that_spring_stays(upright, used, called_an_encod
 @pytest.mark.parametrize(
     ("joint", "amounts", "slip"),
     [
-        (JOINT, AMOUNTS, SLIP),
+        pytest.param(JOINT, AMOUNTS, SLIP, marks=pytest.mark.scenario),
         pytest.param("hip", [1.0, 3.0], 0.0005, marks=pytest.mark.scenario),
         pytest.param(JOINT, AMOUNTS, 0.0005, marks=pytest.mark.slow),
         pytest.param("hip", [1.0, 3.0], SLIP, marks=pytest.mark.slow),
