@@ -73,6 +73,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         reduced = bench.fit(others, noise, start=fit.parameters)
         gain = reduced.statistic - fit.statistic
         enough = no_worse(fit, gain)
+        reach = enough + EQUALLY_GOOD * fit.unit
         alike: list[Alternative] = []
         dearer: list[tuple[Alternative, float]] = []
         scores: list[float] = []
@@ -80,7 +81,9 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         scanned = scan(bench, reduced, noise)
         tried = of_every_kind([c for c in scanned if c.key != effect_key(own)], RIVALS)
         tried = [c for c in tried if not c.gain < 0.3 * gain]
-        for candidate, solution in zip(tried, side_by_side(_InPlace(bench, now, position, enough), tried), strict=True):
+        for candidate, solution in zip(
+            tried, side_by_side(_InPlace(bench, now, position, enough, reach), tried), strict=True
+        ):
             if solution is None:
                 continue
             new = bench.again(solution, noise)
@@ -88,8 +91,12 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             explained = reduced.whitened - fit.whitened
             share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
             other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
+            worse = new.statistic - fit.statistic
+            if not worse < enough:
+                if worse + price < reach:
+                    alike.append(replace(other, behind=worse + price))
             # a play that is never closed is a constant: nothing but its size is fitted
-            if new.statistic - fit.statistic + price < enough or never_closed(bench, new.effects, position):
+            elif worse + price < enough or never_closed(bench, new.effects, position):
                 alike.append(other)
                 scores.append(new.statistic)
             else:
@@ -98,8 +105,8 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
         alike.extend(
             replace(other, dearer=not any(abs(own_score - s) < THE_SAME for s in scores)) for other, own_score in dearer
         )
-        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (not a.dearer, a.cos2))}
-        found[position] = tuple(sorted(unique.values(), key=lambda a: (a.dearer, -a.cos2)))
+        unique = {(a.effect, a.joint): a for a in sorted(alike, key=lambda a: (a.as_likely, a.cos2))}
+        found[position] = tuple(sorted(unique.values(), key=lambda a: (not a.as_likely, -a.cos2)))
     return found
 
 
@@ -111,24 +118,26 @@ class _InPlace:
         bench: the recording.
         now: the model with the effect.
         position: of the effect in it.
-        enough: difference of the statistic up to which another does as well.
+        enough: difference of the statistic up to which another does as well, ...
+        reach: ... and up to which another motion may outweigh it.
     """
 
     bench: Bench
     now: Settled
     position: int
     enough: float
+    reach: float
 
     def __call__(self, candidate: Candidate) -> Solution | None:
-        """The model with a candidate in the place of the effect, None where that does not do as well."""
+        """The model with a candidate in the place of the effect, None where that does much worse."""
         bench, fit, noise, position = self.bench, self.now.fit, self.now.noise, self.position
-        before, after, beat = fit.effects[:position], fit.effects[position + 1 :], fit.statistic + self.enough
+        before, after, beat = fit.effects[:position], fit.effects[position + 1 :], fit.statistic + self.reach
         new = refitted(bench, before, candidate.effect, after, noise, fit.parameters, beat)
-        if new.statistic > beat:
+        if new.statistic > fit.statistic + self.enough:
             new = with_its_power(bench, new, noise, position)
         if slowest(new.effects[position]) or too_short(bench, new.effects[position]):
             return None
-        if new.statistic - fit.statistic < self.enough and physical(bench, new, position):
+        if new.statistic < beat and physical(bench, new, position):
             return new.solution
         return None
 

@@ -31,7 +31,7 @@ OTHER_SHAPES = (1.5, 2.0, 3.0, 4.0)
 
 def declared(alternatives: Mapping[int, tuple[Alternative, ...]]) -> Alternatives:
     """The alternatives of each effect that are as likely where no other motion decides."""
-    return {position: tuple(a for a in others if not a.dearer) for position, others in alternatives.items()}
+    return {position: tuple(a for a in others if a.as_likely) for position, others in alternatives.items()}
 
 
 def simplest_first(
@@ -123,7 +123,7 @@ def decide(
                     left.append(other)
                 if fit is None or rival is None:
                     continue
-                swapped = _better(rival, own)
+                swapped = _better(rival, own, other.behind)
                 if swapped:
                     before = selection.final.fit
                     replaced = replace(selection, final=Settled(fit, selection.final.noise))
@@ -135,6 +135,12 @@ def decide(
                     other, fit = Alternative(out.name, out.joint, other.cos2), before
                     own, rival = rival, own
                 elif other.dearer:
+                    continue
+                elif other.behind:
+                    # where both motions together do not tell them apart, it is as likely after all
+                    nearly = _better(rival, own, other.behind - 2.0 * rival.margin)
+                    if nearly and not _better(own, rival, -other.behind):
+                        left.append(replace(other, fit=fit, behind=0.0))
                     continue
                 elif not _better(own, rival):
                     left.append(replace(other, fit=fit))
@@ -177,8 +183,8 @@ class _Comparison:
 
     def __call__(self, other: Alternative) -> Transfer | None:
         """What an alternative is worth; None where that does not matter."""
-        if other.fit is None or (other.dearer and self.own.excess < EQUALLY_GOOD * self.own.unit):
-            # nothing there that more parameters could explain
+        if other.fit is None or (not other.as_likely and self.own.excess < EQUALLY_GOOD * self.own.unit):
+            # nothing there that more parameters, or others, could explain
             return None
         fit = self.fit(other)
         if fit is None or _twice(fit, self.position, self.selection.added):
@@ -278,11 +284,14 @@ def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:
     ]
 
 
-def _better(one: Transfer, other: Transfer) -> bool:
-    """Whether one effect does better than another on the other motion beyond doubt, and holds there."""
+def _better(one: Transfer, other: Transfer, behind: float = 0.0) -> bool:
+    """Whether one effect does better than another on the other motion beyond doubt, and holds there.
+
+    By so much more of the statistic as it was `behind` on the motion that was used.
+    """
     if not (one.tested and one.holds):
         return False
-    if other.remembers and not one.remembers and one.statistic - other.statistic < EQUALLY_GOOD * one.unit:
+    if other.remembers and not one.remembers and one.statistic + behind - other.statistic < EQUALLY_GOOD * one.unit:
         # what is foretold is worth more than what is fitted there
         return True
-    return other.statistic - one.statistic > one.margin
+    return other.statistic - one.statistic > one.margin + behind

@@ -113,6 +113,9 @@ class Alternative:
         fit: the whole model with it in the place of the effect, where that was fitted; not written to files.
         dearer: whether it does as well by more parameters only: then it is what is missing where another motion says
             so, and no alternative where none does; not written to files.
+        behind: by how much more of the statistic it is the worse one where it does not do as well, though not so much
+            that another motion could not outweigh it: then it is an alternative, or what is missing, where one does;
+            not written to files.
     """
 
     effect: str
@@ -120,11 +123,17 @@ class Alternative:
     cos2: float
     fit: Fit | None = field(default=None, compare=False, repr=False)
     dearer: bool = field(default=False, compare=False, repr=False)
+    behind: float = field(default=0.0, compare=False, repr=False)
 
     @property
     def title(self) -> str:
         """Name and joint."""
         return titled(self.effect, self.joint)
+
+    @property
+    def as_likely(self) -> bool:
+        """Whether it is an alternative where no other motion speaks."""
+        return not self.dearer and self.behind == 0.0
 
 
 TIMES = 1.0

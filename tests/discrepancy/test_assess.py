@@ -16,7 +16,7 @@ from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import decide, declared, simplest_first
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import tried
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, torque_changes
 from sea_ident.discrepancy.next_effect import SCATTER_LEVEL
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -55,6 +55,31 @@ SAME_TORQUE = [
     make_effect("asymmetric_spring", "hip", kink=0.001),
     make_effect("asymmetric_spring", "hip", kink=0.003),
 ]
+
+
+def test_what_is_a_little_behind_is_kept_for_another_motion_and_declared_by_none(preloaded, monkeypatch):
+    bench, _, selection = preloaded
+    first = len(selection.start.fit.effects)
+
+    def others(odds):
+        monkeypatch.setattr("sea_ident.discrepancy.assess.EQUALLY_GOOD", odds)
+        return {(a.effect, a.joint): a for a in rivals(bench, selection)[first + 1]}
+
+    final = selection.final.fit
+    alike = others(1e3)
+    worse = {
+        key: each.fit.statistic - final.statistic
+        + final.unit * (penalty(each.fit.effects[first + 1], bench) - penalty(final.effects[first + 1], bench))
+        for key, each in alike.items()
+        if each.as_likely and each.fit.statistic > final.statistic + 10.0 * final.unit
+    }  # fmt: skip
+    key = max(worse, key=worse.get)
+    odds = 0.75 * worse[key] / final.unit
+    behind = others(odds)[key]
+    assert behind.behind == pytest.approx(worse[key], rel=0.05)
+    assert not behind.as_likely
+    assert key not in {(a.effect, a.joint) for a in declared({0: tuple(others(odds).values())})[0]}
+    assert key not in others(0.4 * worse[key] / final.unit)
 
 
 @pytest.mark.scenario

@@ -39,11 +39,11 @@ def rivals(laboratory):
     return bench, other, start, fits
 
 
-def decided(rivals, own, alternative, *, dearer=False):
+def decided(rivals, own, alternative, *, dearer=False, behind=0.0):
     bench, other, start, fits = rivals
     position = len(start.fit.effects)
     selection = Selection(start, Settled(fits[own], start.noise), 1, (1e-9,))
-    listed = {position: (Alternative(alternative, JOINT, 1.0, fits[alternative], dearer),)}
+    listed = {position: (Alternative(alternative, JOINT, 1.0, fits[alternative], dearer, behind),)}
     held = tried(other, selection, "another motion")
     selection, left, held = decide(bench, selection, listed, held)
     return selection.effects[0].name, [a.effect for a in left[position]], held
@@ -64,6 +64,48 @@ def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
 def test_what_takes_more_parameters_is_taken_where_the_other_motion_asks_for_it_only(rivals):
     assert decided(rivals, "spring_hysteresis", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
     assert decided(rivals, "spring_offset", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
+
+
+@pytest.mark.parametrize(
+    ("behind", "name", "left"),
+    [
+        (0.0, "spring_offset", []),
+        (80.0, "spring_offset", []),
+        (90.0, "spring_hysteresis", ["spring_offset"]),
+        (110.0, "spring_hysteresis", ["spring_offset"]),
+        (120.0, "spring_hysteresis", []),
+    ],
+)
+def test_both_motions_together_decide_about_what_is_a_little_behind(rivals, behind, name, left):
+    """100 less on the other motion, and 13.8 tell two apart: the odds of one motion are worth those of the other."""
+    bench, _, start, fits = rivals
+    position = len(start.fit.effects)
+    worth = {
+        "spring_hysteresis": Transfer(0.9, True, 1200.0, 1.0, 120.0),
+        "spring_offset": Transfer(1.0, True, 1100.0, 1.0, 20.0),
+    }
+
+    class There:
+        """Another motion on which each is worth as much."""
+
+        def __init__(self, selection):
+            self.transfers = (self.worth(selection, position),)
+
+        def worth(self, selection, position, beside=None):
+            return worth[selection.final.fit.effects[position].name]
+
+        def again(self, selection):
+            return There(selection)
+
+    own = Selection(start, Settled(fits["spring_hysteresis"], start.noise), 1, (1e-9,))
+    listed = {position: (Alternative("spring_offset", JOINT, 1.0, fits["spring_offset"], behind=behind),)}
+    selection, alternatives, _ = decide(bench, own, listed, There(own))
+    assert (selection.effects[0].name, [a.effect for a in alternatives[position]]) == (name, left)
+    assert all(a.as_likely for a in alternatives[position])
+
+
+def test_what_holds_on_the_other_motion_has_nothing_to_fear_from_it(rivals):
+    assert decided(rivals, "spring_offset", "spring_hysteresis", behind=20.0)[:2] == ("spring_offset", [])
 
 
 def test_the_same_motion_again_decides_between_no_equals(rivals, laboratory, monkeypatch):
