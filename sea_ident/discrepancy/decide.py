@@ -61,7 +61,7 @@ def simplest_first(
             )
         best, price = None, now.statistic + now.unit * (penalty(own, bench) - CLEARLY)
         for other in others:
-            if other.fit is None or _twice(other.fit, position, selection.added):
+            if other.fit is None or other.behind or _twice(other.fit, position, selection.added):
                 continue
             own_price = penalty(other.fit.effects[position], bench)
             whole = other.fit.statistic + now.unit * own_price

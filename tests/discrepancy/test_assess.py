@@ -208,6 +208,10 @@ def test_of_equals_the_simplest_is_named(preloaded):
     again, same = simplest_first(bench, chosen, left)
     assert again is chosen
     assert same == left
+    # what does not do as well is no equal, however simple
+    simple, *_ = listed[first]
+    worse = {first: (replace(simple, behind=20.0),), first + 1: ()}
+    assert simplest_first(bench, kinked, worse)[0] is kinked
 
 
 def test_more_parameters_are_no_alternative_unless_another_motion_asks_for_them(preloaded):
