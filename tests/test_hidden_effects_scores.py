@@ -108,6 +108,10 @@ def test_the_table_tells_how_long_diagnoses_take(tmp_path: Path) -> None:
     assert (lines["baxter, largest"].value, lines["baxter, largest"].met) == (50.0, True)
     assert lines["baxter, more than 60"].met
     assert not any(what.startswith("ur5") for what in lines)
+    of_the_row = {(line.row, line.what): (line.value, line.met) for line in lines.values()}
+    assert of_the_row["one", "seconds on exo_leg, median of 11"] == (6.0, True)
+    assert of_the_row["one", "seconds on exo_leg, longest of 11"] == (30.0, False)
+    assert of_the_row["one", "seconds on baxter, longest of 1"] == (50.0, True)
     text = write_report(tmp_path)
     assert "seconds of a diagnosis, exo_leg, 90th percentile" in text
     assert "1/11 = 9.1 %" in text

@@ -92,9 +92,11 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
             share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
             other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), new)
             worse = new.statistic - fit.statistic
+            # what it saves by fewer parameters makes up for nothing that it explains less
+            behind = worse + max(price, 0.0)
             if not worse < enough:
-                if worse + price < reach:
-                    alike.append(replace(other, behind=worse + price))
+                if behind < reach:
+                    alike.append(replace(other, behind=behind))
             # a play that is never closed is a constant: nothing but its size is fitted
             elif worse + price < enough or never_closed(bench, new.effects, position):
                 alike.append(other)

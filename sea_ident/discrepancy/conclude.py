@@ -68,7 +68,8 @@ UNEXPLAINED = 0.25
 half as large in torque as what was there, and nothing of the library does that, ..."""
 
 UNEXPLAINED_BY_FRICTION = 0.5
-"""... and the same beside a friction that the model did not have at all [-]."""
+"""... and the same beside a friction that the model did not have at all, and where what is nearest does not hold on
+other data either [-]."""
 
 
 def conclude(

@@ -113,9 +113,9 @@ class Alternative:
         fit: the whole model with it in the place of the effect, where that was fitted; not written to files.
         dearer: whether it does as well by more parameters only: then it is what is missing where another motion says
             so, and no alternative where none does; not written to files.
-        behind: by how much more of the statistic it is the worse one where it does not do as well, though not so much
-            that another motion could not outweigh it: then it is an alternative, or what is missing, where one does;
-            not written to files.
+        behind: how much more of the statistic it leaves, and costs by its parameters, where it does not do as well;
+            not so much that another motion could not outweigh it: where one does, it is an alternative, or what is
+            missing. 0 where it does as well; not written to files.
     """
 
     effect: str

@@ -69,7 +69,7 @@ def test_what_is_a_little_behind_is_kept_for_another_motion_and_declared_by_none
     alike = others(1e3)
     worse = {
         key: each.fit.statistic - final.statistic
-        + final.unit * (penalty(each.fit.effects[first + 1], bench) - penalty(final.effects[first + 1], bench))
+        + final.unit * max(penalty(each.fit.effects[first + 1], bench) - penalty(final.effects[first + 1], bench), 0.0)
         for key, each in alike.items()
         if each.as_likely and each.fit.statistic > final.statistic + 10.0 * final.unit
     }  # fmt: skip

@@ -2,14 +2,15 @@
 
     python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR [--row ROW] [--jobs 2]
     python -m tests.benchmarks.hidden_effects table DIR
-    python -m tests.benchmarks.hidden_effects alone DIR
+    python -m tests.benchmarks.hidden_effects alone DIR [--all] [--row ROW]
 
 Robot, true parameters, trajectory, noise, effects, places and sizes of a case follow from the seed, the row and the
 number of the case. Two engines make the recordings: MuJoCo with forces and time stepping of the benchmark's own, and
 the project's simulator. The diagnosis runs in a process of its own that gets the folder `cases/<case>` with the
 recordings and the nominal description; the truth is in `truth/<case>.json`, read by the scores alone. A run that was
 stopped goes on where it was. `table.txt`, `misses.txt` and `confusion.png` are written beside the cases. `alone` times
-those again that took too long side by side with others (of a run with `--keep`).
+those again that took too long side by side with others (of a run with `--keep`), or all, and tells which say
+something else than before.
 """
 
 import argparse
@@ -40,9 +41,11 @@ def main() -> None:
     shown.add_argument("out", type=Path)
     again = verbs.add_parser("alone", help="time the longest again, one at a time with all cores")
     again.add_argument("out", type=Path)
+    again.add_argument("--all", action="store_true", help="all cases")
+    again.add_argument("--row", action="append", choices=list(ROWS), help="may be given more than once; default all")
     arguments = parser.parse_args()
     if arguments.verb == "alone":
-        for line in alone(arguments.out):
+        for line in alone(arguments.out, not arguments.all, arguments.row or ()):
             print(line, flush=True)
         return
     if arguments.verb == "run":

@@ -132,6 +132,11 @@ def lines_of(scores: list[Score]) -> list[Line]:
         timed = [s for s in scores if s.case.robot == robot and math.isfinite(s.seconds)]
         _seconds(robot, limit, [s.seconds for s in timed], add)
         _seconds(f"{robot}, missing", limit, [s.seconds for s in timed if s.case.row != "none"], add)
+        for row in ROWS:
+            own = [s.seconds for s in timed if s.case.row == row]
+            for label, value in (("median", np.median(own)), ("longest", max(own))) if own else ():
+                what = f"seconds on {robot}, {label} of {len(own)}"
+                add(Line(row, what, f"<= {limit:g}", value=float(value), met=bool(value <= limit)))
     errors = [s for s in scores if s.verdict == "error"]
     add(_share("all", "errors", "0", (s.verdict == "error" for s in scores), lambda x: not errors))
     return lines
