@@ -1,6 +1,7 @@
 """Two effects that one motion does not tell apart: another motion chooses, whichever was named first."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -123,6 +124,26 @@ def test_the_same_motion_again_decides_between_no_equals(rivals, laboratory, mon
     # what does as well by more parameters only is no alternative where no other motion asks for it
     assert left == {position: (other,)}
     assert held.kind is Kind.SAME_MOTION
+
+
+@pytest.mark.parametrize("beyond", [True, False])
+def test_what_the_library_lacks_is_given_no_other_name_by_another_motion(rivals, monkeypatch, beyond):
+    """Whatever of its equals it is called, most stays unexplained: that the nearest does not hold changes nothing."""
+    bench, _, start, fits = rivals
+    position = len(start.fit.effects)
+    selection = Selection(start, Settled(fits["spring_hysteresis"], start.noise), 1, (1e-9,))
+    other = Alternative("spring_offset", JOINT, 1.0, fits["spring_offset"])
+    there = SimpleNamespace(other_motion=True, transfers=(Transfer(0.0, True, 9e3, 1.0, 8e3),))
+    weighed = []
+    monkeypatch.setitem(_tested.__globals__, "held_out", lambda *_: (there, ()))
+    monkeypatch.setitem(_tested.__globals__, "beyond_the_library", lambda *_: beyond)
+    monkeypatch.setitem(_tested.__globals__, "decide", lambda *given: (weighed.append(True), *given[1:])[1:])
+    confirmed = Confirmed(selection, bench, start, selection.final)
+    listed = {position: (other, replace(other, behind=20.0))}
+    now, left, _, _ = _tested(bench, confirmed, listed, TrendTest(1.0, (), False), None)
+    assert now is confirmed
+    assert left == ({position: (other,)} if beyond else listed)
+    assert bool(weighed) is not beyond
 
 
 def test_what_holds_there_as_well_stays_possible(rivals):
