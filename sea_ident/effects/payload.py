@@ -26,6 +26,7 @@ class Payload(Effect):
     name: ClassVar[str] = "payload"
     side: ClassVar[Side] = Side.BOTH
     source: ClassVar[str] = "Khalil, Gautier, Lemoine, Identification of the payload inertial parameters, ICRA 2007"
+    depends_on: ClassVar[tuple[str, ...]] = ("q", "dq", "ddq")
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """Mass, first moments and inertia about the joint frame."""

@@ -133,11 +133,12 @@ class BodyColumns:
         return BodyColumns._build(model, tensors, places, len(parameters))
 
     @staticmethod
-    def torque(model: pin.Model) -> "BodyColumns":
-        """The torque of a model with its own inertial parameters, as a single column."""
+    def torque(model: pin.Model, inertial: FloatArray | None = None) -> "BodyColumns":
+        """The torque of a model with standard inertial parameters (10 b,), or with its own, as a single column."""
+        if inertial is None:
+            inertial = np.concatenate([model.inertias[k].toDynamicParameters() for k in range(1, model.njoints)])
         tensors = [np.zeros((6, 0, 12))]
-        for k in range(1, model.njoints):
-            values = model.inertias[k].toDynamicParameters()
+        for values in inertial.reshape(-1, 10):
             tensors.append(np.einsum("abc,b->ac", _WRENCH, values)[:, None, :])
         places = [np.zeros(tensor.shape[1], dtype=np.intp) for tensor in tensors]
         return BodyColumns._build(model, tensors, places, 1)
