@@ -60,6 +60,8 @@ ALIKE = (("stribeck_friction", "nonlinear_viscous_friction"), ("torque_ripple",)
 OWN_AMOUNT = 7.0
 """... and standard deviations that each must have of its own where there are two of one motor."""
 
+VISCOUS = "viscous_friction"
+
 DRIVES = 0.1
 """Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise may do [-]."""
 
@@ -285,16 +287,27 @@ def is_of_a_law(effect: Effect) -> TypeGuard[AsymmetricSpring | SpringStiffening
     return isinstance(effect, AsymmetricSpring) or (isinstance(effect, SpringStiffening) and effect.exponent != CUBIC)
 
 
-def brakes(bench: Bench, fit: Fit, position: int) -> bool:
-    """Whether dry friction still brakes beside friction of another law: at any speed, and where the motor hardly moves.
+def is_term(effect: Effect) -> bool:
+    """Whether an effect is a term more in a law that the model has: of a spring, or of friction that grows with speed."""
+    return is_of_a_law(effect) or isinstance(effect, NonlinearViscousFriction)
 
-    The law may bend like the sum of a larger one and a dry friction that drives.
+
+def brakes(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether the friction of a motor still brakes beside friction of another law, at any speed of this motion.
+
+    The law may bend like the sum of a larger one and a dry friction that drives. Viscous friction that a power beside
+    it cancels in part is no such thing: friction that grows ever slower is that sum, whatever the two come to.
     """
     effect = fit.effects[position]
-    dry = fit.parameters.get(f"{effect.joint}.coulomb_friction", 0.0)
-    if not isinstance(effect, StribeckFriction | NonlinearViscousFriction) or dry >= 0.0:
+    if not isinstance(effect, StribeckFriction | NonlinearViscousFriction):
         return True
-    torque = effect.evaluate(bench.state(fit.effects)).motor @ np.array([fit.parameters[effect.parameter_name()]])
+    own = fit.parameters[effect.parameter_name()]
+    dry, viscous = (fit.parameters.get(f"{effect.joint}.{name}", 0.0) for name in ("coulomb_friction", VISCOUS))
+    if isinstance(effect, NonlinearViscousFriction):
+        speed = np.abs(bench.state(fit.effects).motion.dtheta[:, bench.robot.index(effect.required_joint)])
+        law = dry + viscous * speed + own * speed**effect.exponent
+        return bool(np.min(law) > -DRIVES * np.max(law))
+    torque = effect.evaluate(bench.state(fit.effects)).motor * own
     return bool(-dry < DRIVES * float(np.max(np.abs(torque))))
 
 
@@ -367,8 +380,8 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
         return False  # where it ends beside what came after it, too
     if not pushes_back(bench, fit, position) or not brakes(bench, fit, position) or not builds_up(fit, position):
         return False
-    if is_of_a_law(effect):
-        return True  # terms of the law of one spring cancel in part, and what they come to is asked above
+    if is_term(effect):
+        return True  # terms of one law cancel in part, and what they come to is asked above
     total = np.sqrt(np.sum(np.abs(bench.column_spectra(effect, fit.effects) @ values) ** 2, axis=0))
     return not np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms)
 

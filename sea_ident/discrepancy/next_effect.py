@@ -18,8 +18,8 @@ from sea_ident.discrepancy.judge import (
     at_a_bound,
     comes_first,
     flat_steps,
-    is_of_a_law,
     is_push,
+    is_term,
     own_torque,
     penalty,
     possible,
@@ -265,7 +265,7 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: F
     if slack or at_a_bound(effect) or too_short(bench, effect):
         return False
     own = own_torque(bench, new, -1)
-    cancels = is_signal(effect) or is_of_a_law(effect)  # an error of a sensor is taken up, and so is a term of a law
+    cancels = is_signal(effect) or is_term(effect)  # an error of a sensor is taken up, and so is a term of a law
     if own > LARGE_TORQUE and not cancels and torque_change(bench, fit, new) < CANCELLED * own:
         return False
     if fit.statistic - new.statistic > COMPLETE * fit.excess:

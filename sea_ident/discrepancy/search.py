@@ -58,7 +58,11 @@ HOPELESS = 100.0
 """Statistic over degrees of freedom beyond which no further effect is looked for, ..."""
 
 SLOW = 0.4
-"""... where the second or a later one left more than this share of the excess: the library does not have it."""
+"""... where the last one left more than this share of the excess, ..."""
+
+FEWEST_LOST = 3
+"""... and was the third or a later one: the library does not have it. Of several effects that matter alike each leaves
+about half, and what explains the rest does so only beside all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +158,8 @@ def search(
 
 
 def _lost(now: Settled, before: Settled, added: int, candidates: Sequence[Candidate]) -> bool:
-    """Whether a second or later effect left so much, that the library does not have what is missing.
-
-    Two effects that matter alike leave half each: then another one promises the rest.
-    """
-    far = added > 1 and now.fit.statistic > HOPELESS * now.fit.dof
+    """Whether the last effect left so much, and nothing promises the rest, that the library does not have it."""
+    far = added >= FEWEST_LOST and now.fit.statistic > HOPELESS * now.fit.dof
     most = max((candidate.gain for candidate in candidates), default=0.0)
     return far and now.fit.excess > SLOW * before.fit.excess and most < (1.0 - SLOW) * now.fit.excess
 
@@ -225,7 +226,7 @@ def _eliminate(
         first = len(fit.effects) - len(added)
         positions = range(first, len(fit.effects))
         scores = list(side_by_side(_Elimination(bench, now, tests, nameless), positions))
-        worst = max(zip(scores, positions, strict=True), key=lambda each: (each[0].p_value, -each[0].statistic))
+        worst = max(zip(scores, positions, strict=True), key=lambda each: each[0].rank)
         if worst[0].p_value <= FAMILY_LEVEL:
             break
         now = settle_again(bench, bench.again(worst[0].left, noise))
@@ -241,11 +242,19 @@ class _Without:
         p_value: of the effect, 1 where it is not needed.
         statistic: without it.
         left: the model without it.
+        sound: whether the others are physical there. Where two bend one another, the one that fits a little better
+            alone may do so as what cannot be.
     """
 
     p_value: float
     statistic: float
     left: Solution
+    sound: bool
+
+    @property
+    def rank(self) -> tuple[bool, bool, float, float]:
+        """The larger, the rather the effect is taken out."""
+        return self.p_value > FAMILY_LEVEL, self.sound, self.p_value, -self.statistic
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +288,9 @@ class _Elimination:
             needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
         needed = needed and not bends_another(bench, fit, position)
         p_value = significance(loss, columns, self.tests, without, noise) if needed else 1.0
-        return _Without(p_value, without.statistic, without.solution)
+        added = range(len(bench.effects), len(others))
+        sound = p_value <= FAMILY_LEVEL or all(physical(bench, without, k) for k in added)
+        return _Without(p_value, without.statistic, without.solution, sound)
 
 
 def without(bench: Bench, selection: Selection, weak: Sequence[int]) -> Selection:

@@ -10,6 +10,7 @@ from sea_ident.discrepancy.diagnose import _out
 from sea_ident.discrepancy.judge import (
     BEHIND_LAWS,
     COMPLETE,
+    LARGEST_TIMES_TORQUE,
     WRONG_PART,
     at_a_bound,
     bends_another,
@@ -17,6 +18,7 @@ from sea_ident.discrepancy.judge import (
     comes_first,
     dissipates,
     never_closed,
+    own_torque,
     physical,
     possible,
     pushes_back,
@@ -155,6 +157,26 @@ def test_friction_of_another_law_leaves_dry_friction_that_brakes(nothing_missing
         values[names.index("knee.coulomb_friction")] = dry
         values[names.index(f"knee.{name}")] = 1.0 / largest
         assert physical(bench, replace(fit, values=values), -1) == accepted
+
+
+@pytest.mark.parametrize(("viscous", "accepted"), [(-0.9, True), (-1.3, False)])
+def test_a_power_of_the_speed_may_be_larger_than_all_torque_beside_viscous_friction_that_it_cancels(
+    nothing_missing, viscous, accepted
+):
+    """As long as both together brake at every speed: ten times the torque here, of which a tenth is left, or less."""
+    bench, start = nothing_missing
+    effect = make_effect("nonlinear_viscous_friction", "knee", exponent=0.8)
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    names, i = [c.name for c in fit.columns], bench.robot.index("knee")
+    fastest = float(np.max(np.abs(bench.data.motion.dtheta[:, i])))
+    size = 10.0 * float(np.max(np.abs(bench.data.tau_motor[:, i])))
+    values = fit.values.copy()
+    values[names.index("knee.coulomb_friction")] = 0.0
+    values[names.index("knee.nonlinear_viscous_friction")] = size / fastest**0.8
+    values[names.index("knee.viscous_friction")] = viscous * size / fastest
+    law = replace(fit, values=values)
+    assert own_torque(bench, law, -1) > LARGEST_TIMES_TORQUE
+    assert physical(bench, law, -1) == accepted
 
 
 @pytest.mark.parametrize(("share", "accepted"), [(0.05, False), (0.3, True), (1.0, True), (1.8, True), (8.0, False)])

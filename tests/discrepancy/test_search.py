@@ -1,6 +1,6 @@
 """What the search adds to a model: small effects beside large ones, and the simpler of two that say the same."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,12 +9,13 @@ import pytest
 from sea_ident import side_by_side
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, slowest
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, own_torque, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
-from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, visible_changes
+from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, LARGE_TORQUE, visible_changes
 from sea_ident.discrepancy.search import Selection, _eliminate, _lost, search, still_needed
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
+from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 
 
 def named(selection):
@@ -248,6 +249,46 @@ def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, 
     assert named(still_needed(bench, begun)) == {("torque_offset", "knee")}
 
 
+def test_of_two_that_only_bend_each_other_the_one_goes_without_which_the_other_can_be(unequal, monkeypatch):
+    """Though what cannot be fits better: alone it would go as well, and nothing be left."""
+    bench, found = unequal
+    both = len(found.final.fit.effects)
+    monkeypatch.setattr("sea_ident.discrepancy.search.bends_another", lambda _, fit, __: len(fit.effects) == both)
+
+    def physical(_, fit, position):
+        return len(fit.effects) == both or fit.effects[position].name != "torque_offset"
+
+    monkeypatch.setattr("sea_ident.discrepancy.search.physical", physical)
+    assert named(still_needed(bench, found)) == {("stribeck_friction", "hip")}
+
+
+@dataclass(frozen=True)
+class Thinning(NonlinearViscousFriction):
+    """Friction of a grease that thins with the speed of shear: c theta' / (1 + |theta'| / speed)."""
+
+    speed: float = 1.0
+
+    def local_columns(self, q, dq, theta, dtheta):
+        return (dtheta / (1.0 + np.abs(dtheta) / self.speed))[:, None]
+
+
+@pytest.mark.parametrize(("joint", "size", "speed"), [("ankle", 15.0, 1.0), ("hip", 60.0, 1.0), ("hip", 150.0, 0.3)])
+def test_friction_that_thins_with_speed_is_nonlinear_viscous(laboratory, joint, size, speed):
+    """Power and viscous friction cancel in large part: what they come to brakes at any speed."""
+    bench = laboratory.bench(laboratory.record([(Thinning(joint, speed=speed), [size])]))
+    found = search(bench, bench.effects)
+    assert named(found) == {("nonlinear_viscous_friction", joint)}
+    fit = found.final.fit
+    assert own_torque(bench, fit, -1) > LARGE_TORQUE
+    speeds = np.linspace(0.25, 1.0, 20) * np.abs(bench.data.motion.dtheta[:, bench.robot.index(joint)]).max()
+    power = fit.parameters[f"{joint}.nonlinear_viscous_friction"] * speeds ** fit.effects[-1].exponent
+    usual = {c.name: value for c, value in zip(fit.columns, fit.values, strict=True)}
+    law = usual[f"{joint}.coulomb_friction"] + usual[f"{joint}.viscous_friction"] * speeds + power
+    actuator = bench.robot.joints[bench.robot.index(joint)].actuator
+    true = actuator.viscous_friction * speeds + actuator.coulomb_friction + size * speeds / (1.0 + speeds / speed)
+    np.testing.assert_allclose(law, true, rtol=0.1)
+
+
 @pytest.mark.scenario
 @pytest.mark.parametrize(
     ("coulomb", "motion"),
@@ -309,11 +350,11 @@ def test_what_another_search_found_is_no_step_of_this_one(laboratory, monkeypatc
 @pytest.mark.parametrize(
     ("added", "statistic", "promised", "lost"),
     [
-        (2, 6e4, 2e4, True),
-        (2, 6e4, 4e4, False),  # another one promises most of what is left
-        (2, 3e4, 1e4, False),  # it took most of what was there
-        (1, 6e4, 2e4, False),  # the first of many
-        (2, 5e2, 2e2, False),  # little is left
+        (3, 6e4, 2e4, True),
+        (3, 6e4, 4e4, False),  # another one promises most of what is left
+        (3, 3e4, 1e4, False),  # it took most of what was there
+        (2, 6e4, 2e4, False),  # one of many that matter alike
+        (3, 5e2, 2e2, False),  # little is left
     ],
 )
 def test_a_search_is_lost_far_from_right_where_nothing_takes_most_of_what_is_left(added, statistic, promised, lost):
