@@ -288,7 +288,7 @@ def is_of_a_law(effect: Effect) -> TypeGuard[AsymmetricSpring | SpringStiffening
 
 
 def is_term(effect: Effect) -> bool:
-    """Whether an effect is a term more in a law that the model has: of a spring, or of friction that grows with speed."""
+    """Whether an effect is a term more in a law that the model has: of a spring, or of viscous friction."""
     return is_of_a_law(effect) or isinstance(effect, NonlinearViscousFriction)
 
 
