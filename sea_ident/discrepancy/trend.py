@@ -60,6 +60,9 @@ UNEXPLAINED = 0.5
 FEWEST_AFTER_START = 5
 """Periods from which on the first may be left out as start-up."""
 
+SOON = 2.0
+"""Periods in a time constant below which what drifts is named only where its rate is known."""
+
 SMALLEST_CHANGE = 1e-3
 """A trend must change the torque of an equation by this share of its rms over the recording, or it does not matter."""
 
@@ -175,7 +178,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value
     trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
-    short = [c.direction.bent and not trend.known for c, trend in zip(chosen, trends, strict=True)]
+    short = [_is_over_soon(bench, c.direction) and not trend.known for c, trend in zip(chosen, trends, strict=True)]
     if any(short):
         notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
         chosen = [c for c, over in zip(chosen, short, strict=True) if not over]
@@ -266,6 +269,12 @@ def _apart(first: FloatArray, later: FloatArray) -> float:
     spread = float(np.sum(np.diff(later, axis=0) ** 2)) / (2.0 * (len(later) - 1))
     ratio = float(difference @ difference) / max(spread, 1e-300)
     return float(stats.f.sf(ratio, directions, directions * step_freedom(len(later))))
+
+
+def _is_over_soon(bench: Bench, direction: Direction) -> bool:
+    """Whether what drifts stands still again after a period or two: whatever was still settling does that."""
+    constant = float(getattr(direction.effect, "time_constant", np.inf))
+    return direction.bent and constant < SOON * bench.data.period
 
 
 def _over_too_soon(bench: Bench, trend: Trend) -> str:

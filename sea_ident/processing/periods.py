@@ -192,6 +192,9 @@ def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> 
     return Cut(period, samples, periods, -1, start)
 
 
+DIES_AWAY = 0.5
+"""Share of its distance from later periods that a transient has one period on, at most [-]."""
+
 GAP = 0.02
 """Share of a period that may be without samples: motion of many harmonics is not known within a longer gap."""
 
@@ -218,9 +221,12 @@ def leading_transients(stack: FloatArray) -> int:
     Args:
         stack: (P, N, k) positions of all periods.
 
+    A transient dies away from one period to the next. What changes by a little less every time is a drift of the robot,
+    and its first periods show it best.
+
     Returns:
         Number of leading periods that differ from the middle one of the later half by more than five times the usual
-        distance; at most half of them.
+        distance, and by much more than the next one does; at most half of them.
     """
     count = len(stack)
     if count < 4:
@@ -232,7 +238,7 @@ def leading_transients(stack: FloatArray) -> int:
     usual = float(np.median(distance[count // 2 :]))
     limit = max(5.0 * usual, 1e-7)
     drop = 0
-    while drop < count // 2 and distance[drop] > limit:
+    while drop < count // 2 and distance[drop] > limit and distance[drop + 1] < DIES_AWAY * distance[drop]:
         drop += 1
     return drop
 

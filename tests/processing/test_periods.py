@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from sea_ident.processing.periods import detect_period
+from sea_ident.processing.periods import detect_period, leading_transients
 
 INTERVAL = 0.01
 TIME = np.arange(3000) * INTERVAL
@@ -87,3 +87,23 @@ def test_nothing_that_moves_has_no_period():
 def test_the_smallest_of_several_periods_is_meant():
     found = [detect_period(TIME[:stop], motion(4.0)[:stop]) for stop in (900, 1300, 2500, 3000)]
     assert all(a == pytest.approx(b) for a, b in pairwise(found))
+
+
+@pytest.mark.parametrize(
+    ("start", "drift", "left_out"),
+    [
+        (0.0, 0.0, 0),
+        (0.1, 0.0, 1),  # over after one period
+        (100.0, 0.0, 3),  # a thirtieth of it in the second is still much
+        (0.0, 0.05, 0),  # the later half drifts by less than a fifth of what the first period is off
+        (1.0, 0.05, 1),
+    ],
+)
+def test_a_start_is_left_out_and_a_drift_is_not(start, drift, left_out):
+    rng = np.random.default_rng(5)
+    period, periods = 100, 20
+    shape = np.sin(2.0 * np.pi * np.arange(period) / period)
+    p = np.arange(periods)[:, None]
+    course = start * 0.03**p * np.cos(0.3 * shape) + drift * 0.85**p * shape
+    stack = (shape + course + 1e-3 * rng.normal(size=(periods, period)))[:, :, None]
+    assert leading_transients(stack) == left_out
