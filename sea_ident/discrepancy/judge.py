@@ -17,12 +17,14 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.backlash import Backlash
+from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.presliding_friction import PreslidingFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
+from sea_ident.effects.viscous_friction import ViscousFriction
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
@@ -59,8 +61,6 @@ ALIKE = (("stribeck_friction", "nonlinear_viscous_friction"), ("torque_ripple",)
 
 OWN_AMOUNT = 7.0
 """... and standard deviations that each must have of its own where there are two of one motor."""
-
-VISCOUS = "viscous_friction"
 
 DRIVES = 0.1
 """Share of the largest torque of a friction by which dry friction beside it may be below zero, as noise may do [-]."""
@@ -301,14 +301,17 @@ def brakes(bench: Bench, fit: Fit, position: int) -> bool:
     effect = fit.effects[position]
     if not isinstance(effect, StribeckFriction | NonlinearViscousFriction):
         return True
-    own = fit.parameters[effect.parameter_name()]
-    dry, viscous = (fit.parameters.get(f"{effect.joint}.{name}", 0.0) for name in ("coulomb_friction", VISCOUS))
+    motion, i = bench.state(fit.effects).motion, bench.robot.index(effect.required_joint)
+    state = motion.q[:, i], motion.dq[:, i], motion.theta[:, i], motion.dtheta[:, i]
+    own = effect.local_columns(*state)[:, 0] * fit.parameters[effect.parameter_name()]
     if isinstance(effect, NonlinearViscousFriction):
-        speed = np.abs(bench.state(fit.effects).motion.dtheta[:, bench.robot.index(effect.required_joint)])
-        law = dry + viscous * speed + own * speed**effect.exponent
-        return bool(np.min(law) > -DRIVES * np.max(law))
-    torque = effect.evaluate(bench.state(fit.effects)).motor * own
-    return bool(-dry < DRIVES * float(np.max(np.abs(torque))))
+        usual = (e for e in fit.effects if isinstance(e, CoulombFriction | ViscousFriction) and e.joint == effect.joint)
+        for other in usual:
+            own += other.local_columns(*state)[:, 0] * fit.parameters[other.parameter_name()]
+        braking = own * np.sign(motion.dtheta[:, i])
+        return bool(np.min(braking) > -DRIVES * np.max(braking))
+    dry = fit.parameters.get(f"{effect.joint}.coulomb_friction", 0.0)
+    return bool(-dry < DRIVES * float(np.max(np.abs(own))))
 
 
 def builds_up(fit: Fit, position: int) -> bool:
