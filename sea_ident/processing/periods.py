@@ -15,6 +15,12 @@ REPEATS_WITHIN = 0.02
 ALIKE = 0.5 * 0.01**2
 """The same where repeats differ by a hundredth of the motion: machines that follow a periodic reference stay below."""
 
+DRIFTING = 0.5 * 0.05**2
+"""The same where repeats differ by a twentieth of the motion after half of all periods, ..."""
+
+FEWEST_DRIFTING = 5
+"""... if there are so many of them, as the motion of a robot whose friction drifts; of fewer it may be chance."""
+
 NOISE = 9.0
 """Mean square difference over that of the noise up to which noise explains it."""
 
@@ -81,8 +87,9 @@ def detect_period(time: FloatArray, values: FloatArray) -> float | None:
     """The period of signals, if they repeat themselves beyond doubt.
 
     A smooth motion is always a little like itself some time later. It counts as periodic where repeats differ by no
-    more than their noise explains, or than a hundredth of the motion, or by no more after several periods than after
-    one. The first of three or more periods is not looked at: it is where motions begin.
+    more than their noise explains, or than a hundredth of the motion (of many repeats a twentieth, by which a motion
+    may drift), or by no more after several periods than after one. The first of three or more periods is not looked at:
+    it is where motions begin.
 
     Args:
         time: (M,) uniform times [s].
@@ -111,7 +118,8 @@ def detect_period(time: FloatArray, values: FloatArray) -> float | None:
         period = place / k
         differences.append(difference)
     noise = float(np.mean(noise_from_curvature(values[:, moving]) / values[:, moving].var(axis=0)))
-    bound = max(ALIKE, NOISE * noise, GROWTH * differences[0] if last > 1 else 0.0)
+    alike = DRIFTING if repeats >= FEWEST_DRIFTING else ALIKE
+    bound = max(alike, NOISE * noise, GROWTH * differences[0] if last > 1 else 0.0)
     if max(differences) > bound:
         return None
     # many logs hold a whole number of samples per period; what is that within the accuracy of the lag is that

@@ -49,6 +49,14 @@ def test_scatter_between_repeats_that_does_not_grow_is_no_evidence_against_a_per
     assert detect_period(TIME, motion(3.0) + scatter) == pytest.approx(3.0, abs=0.02)
 
 
+@pytest.mark.parametrize(("most", "found"), [(0.04, True), (0.3, False)])
+def test_a_motion_that_drifts_has_its_period(most, found):
+    """By a few hundredths of it in all, as where friction warms up; what drifts by more does not repeat itself."""
+    drift = most * (1.0 - np.exp(-TIME[:, None] / 20.0)) * np.roll(motion(3.0), 40, axis=0)
+    period = detect_period(TIME, motion(3.0) + drift + noise(1e-5))
+    assert period == (pytest.approx(3.0, abs=1e-3) if found else None)
+
+
 def two_frequencies(rng):
     """What repeats nearly, at lags at which both are nearly through."""
     rates = 2.0 * np.pi * 0.3 * rng.uniform(0.5, 2.0, 2)
