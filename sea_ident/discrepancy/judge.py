@@ -47,6 +47,9 @@ FEWEST_TO_SEARCH = 4
 
 Of three periods with nothing missing a fifth got a name."""
 
+OF_THE_SCATTER = 0.3
+"""Standard deviations of the position of a motor from pass to pass below which no friction is known to build up [-]."""
+
 ALL_THE_TIME = 0.75
 """Share of a period from which on a push is none: what pauses now and then acts all the time [-]."""
 
@@ -171,10 +174,16 @@ def comes_first(gain: float, by_law: float, fit: Fit) -> bool:
 
 
 def too_short(bench: Bench, effect: Effect) -> bool:
-    """Whether a push is shorter than what is compared can show, or lasts nearly all the time.
+    """Whether an effect is over sooner than what is compared can show, or a push lasts nearly all the time.
 
-    Then it only stands in for something sudden, or for what acts all the time.
+    Then it only stands in for something sudden, or for what acts all the time. Friction that builds up over less than
+    the passes of a motor differ by is another one in each, and its mean is none of this law.
     """
+    if isinstance(effect, PreslidingFriction):
+        i = bench.robot.index(effect.required_joint)
+        passes = np.stack([motion.theta[:, i] for motion in bench.data.period_motions])
+        differ = float(np.median(np.std(np.diff(passes, axis=0), axis=0))) / np.sqrt(2.0) if len(passes) > 2 else 0.0
+        return effect.displacement < OF_THE_SCATTER * differ
     if not is_push(effect):
         return False
     return _length(bench, effect) < 0.5 / bench.data.harmonics or nearly_always(bench, effect)

@@ -1,5 +1,7 @@
 """What a recording is compared by: how far the regressor reaches, and that a spring is not lost on the way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,22 @@ def test_a_push_of_a_few_samples_or_nearly_all_the_time_is_none(nothing_missing,
     push = make_effect("external_force", "knee", start=1.0, stop=stop, period=bench.data.period)
     assert too_short(bench, push) is expected
     assert not too_short(bench, make_effect("torque_offset", "knee"))
+
+
+@pytest.mark.parametrize(("displacement", "periods", "expected"), [(2e-5, 8, True), (5e-5, 8, False), (2e-5, 2, False)])
+def test_friction_builds_up_over_more_than_a_part_of_what_passes_differ_by(
+    nothing_missing, displacement, periods, expected
+):
+    """Passes that differ by a tenth of a milliradian at the knee, and by ten times as much at the hip."""
+    bench: Bench = nothing_missing[0]
+    rng, data = np.random.default_rng(0), bench.data
+    by_joint = 1e-4 * np.array([10.0, 1.0, 0.1])
+    passes = tuple(
+        replace(data.motion, theta=data.motion.theta + by_joint * rng.standard_normal(data.motion.theta.shape))
+        for _ in range(periods)
+    )
+    scattered = Bench(replace(data, period_motions=passes), bench.effects)
+    assert too_short(scattered, make_effect("presliding_friction", "knee", displacement=displacement)) is expected
 
 
 @pytest.mark.scenario
