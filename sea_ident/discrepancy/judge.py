@@ -183,7 +183,7 @@ def too_short(bench: Bench, effect: Effect) -> bool:
         i = bench.robot.index(effect.required_joint)
         passes = np.stack([motion.theta[:, i] for motion in bench.data.period_motions])
         differ = float(np.median(np.std(np.diff(passes, axis=0), axis=0))) / np.sqrt(2.0) if len(passes) > 2 else 0.0
-        return effect.displacement < OF_THE_SCATTER * differ
+        return bool(effect.displacement < OF_THE_SCATTER * differ)
     if not is_push(effect):
         return False
     return _length(bench, effect) < 0.5 / bench.data.harmonics or nearly_always(bench, effect)
