@@ -281,7 +281,8 @@ class _Elimination:
         loss = without.statistic - fit.statistic
         columns = max(len(fit.effects[position].columns(bench.robot)), 1)
         visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
-        needed = visible >= SMALLEST_SHARE and physical(bench, fit, position)
+        # as where it was added: what the model bends by without it says nothing of its size
+        needed = min(visible, 2.0 * own) >= SMALLEST_SHARE and physical(bench, fit, position)
         if is_push(fit.effects[position]):
             needed = needed and own > BEYOND_FORM * self.nameless
             # a push comes and goes: nothing but another push can cancel it

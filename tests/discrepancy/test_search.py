@@ -262,6 +262,16 @@ def test_of_two_that_only_bend_each_other_the_one_goes_without_which_the_other_c
     assert named(still_needed(bench, found)) == {("stribeck_friction", "hip")}
 
 
+@pytest.mark.parametrize(("own", "left"), [(4e-4, 1), (6e-4, 2)])
+def test_what_is_smaller_than_what_matters_goes_however_the_model_bends_without_it(unequal, monkeypatch, own, left):
+    bench, found = unequal
+    shares = {"stribeck_friction": own, "torque_offset": 1.0}
+    monkeypatch.setattr(
+        "sea_ident.discrepancy.search.own_torque", lambda _, fit, position: shares[fit.effects[position].name]
+    )
+    assert still_needed(bench, found).added == left
+
+
 @dataclass(frozen=True)
 class Thinning(NonlinearViscousFriction):
     """Friction of a grease that thins with the speed of shear: c theta' / (1 + |theta'| / speed)."""
