@@ -279,7 +279,7 @@ def _out(held: HeldOut, drifting: int, at_rest: Collection[int]) -> list[int]:
     Where dry friction in a spring rests need not be the same there.
     """
     tried = [k for k in range(len(held.transfers)) if k not in at_rest]
-    weak = [k for k in tried if not held.transfers[k].holds]
+    weak = [k for k in tried if held.transfers[k].ruled_out]
     if len(weak) < len(tried) + drifting:
         return weak
     return [min(weak, key=lambda k: held.transfers[k].share)] if len(weak) > 1 else []

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.contribution import as_known
@@ -25,6 +27,10 @@ TRANSFERS = 0.5
 TRANSFERS_ALONE = 0.7
 """... and the same where nothing else is missing that could spoil it: then it holds in part only."""
 
+SPOILT = 0.25
+"""Share from which on it may be what else is missing there that speaks against an effect, where that is more than the
+effect could explain: what would be best beside it is bent by that."""
+
 UNDECIDED = 0.1
 """Share of what neither explains on the other motion that a difference between two must exceed [-]: something else is
 wrong there, and could lean to either."""
@@ -44,6 +50,7 @@ class Transfer:
         excess: what of it is beyond the noise.
         unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
         remembers: whether it needs a constant torque of its own there, which depends on what was before.
+        possible: what it could explain there, in the unit of the statistic.
     """
 
     share: float
@@ -52,6 +59,7 @@ class Transfer:
     unit: float = 1.0
     excess: float = 0.0
     remembers: bool = False
+    possible: float = np.inf
 
     @property
     def margin(self) -> float:
@@ -62,6 +70,11 @@ class Transfer:
     def holds(self) -> bool:
         """Whether nothing speaks against it."""
         return not self.tested or self.share > TRANSFERS
+
+    @property
+    def ruled_out(self) -> bool:
+        """Whether it does not hold, and not for what else is missing there."""
+        return not self.holds and not (self.share > SPOILT and self.possible < self.excess)
 
 
 def transfer(
@@ -160,7 +173,8 @@ class _Trial:
                 # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
                 tested = self._tells(without, alone().statistic)
             share = max(share, self._share_beside_free())
-        return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers)
+        possible = without.statistic - min(free.statistic, fixed.statistic)
+        return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers, possible)
 
     def _beside(self) -> list[Effect]:
         """What stands beside the torque of the others that is known: their signals, and what their springs remember."""

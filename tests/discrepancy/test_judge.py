@@ -82,7 +82,7 @@ def test_dry_friction_in_a_spring_has_no_sign_where_it_sticks(nothing_missing, s
     ],
 )
 def test_what_does_not_hold_goes_and_where_nothing_holds_the_worst(shares, drifting, at_rest, out):
-    transfers = [SimpleNamespace(share=share, holds=share > 0.5) for share in shares]
+    transfers = [SimpleNamespace(share=share, ruled_out=share <= 0.5) for share in shares]
     assert _out(SimpleNamespace(transfers=transfers), drifting, at_rest) == out
 
 

@@ -5,7 +5,7 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
-from sea_ident.discrepancy.transfer import transfer
+from sea_ident.discrepancy.transfer import Transfer, transfer
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
@@ -72,3 +72,18 @@ def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect
     )
     assert hip.share > 0.8
     assert knee.share > 0.8
+
+
+@pytest.mark.parametrize(
+    ("share", "possible", "excess", "out"),
+    [
+        (0.6, 1e3, 1e5, False),  # it holds
+        (0.4, 1e3, 5e2, True),  # little else is missing that could speak against it
+        (0.4, 1e3, 5e3, False),
+        (0.2, 1e3, 5e3, True),  # whatever else is missing
+        (-3.0, 1e3, 5e3, True),
+    ],
+)
+def test_what_explains_less_than_is_missing_beside_it_is_not_ruled_out_by_half(share, possible, excess, out):
+    assert Transfer(share, True, excess=excess, possible=possible).ruled_out == out
+    assert not Transfer(share, False, excess=excess, possible=possible).ruled_out
