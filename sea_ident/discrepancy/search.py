@@ -13,6 +13,7 @@ from sea_ident.discrepancy.edges import sharpened
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.judge import (
+    at_a_bound,
     bends_another,
     is_push,
     own_torque,
@@ -283,6 +284,8 @@ class _Elimination:
         visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
         # as where it was added: what the model bends by without it says nothing of its size
         needed = min(visible, 2.0 * own) >= SMALLEST_SHARE and physical(bench, fit, position)
+        # nor what beside the others ended at the end of its range
+        needed = needed and not at_a_bound(fit.effects[position])
         if is_push(fit.effects[position]):
             needed = needed and own > BEYOND_FORM * self.nameless
             # a push comes and goes: nothing but another push can cancel it

@@ -272,6 +272,17 @@ def test_what_is_smaller_than_what_matters_goes_however_the_model_bends_without_
     assert still_needed(bench, found).added == left
 
 
+def test_what_ended_at_the_end_of_its_range_beside_the_others_goes(unequal):
+    """It was at none when it was added: the others were missing yet."""
+    bench, found = unequal
+    lowest = next(s.lower for s in found.effects[0].shapes + found.effects[1].shapes if s.name == "speed")
+    ended = [replace(e, speed=lowest) if e.name == "stribeck_friction" else e for e in found.effects]
+    fit = bench.fit((*bench.effects, *ended), found.final.noise, start=found.final.fit.parameters)
+    left, p_values = _eliminate(bench, Settled(fit, found.final.noise), list(found.p_values), found.tests)
+    assert [e.name for e in left.fit.effects[len(bench.effects) :]] == ["torque_offset"]
+    assert len(p_values) == 1
+
+
 @dataclass(frozen=True)
 class Thinning(NonlinearViscousFriction):
     """Friction of a grease that thins with the speed of shear: c theta' / (1 + |theta'| / speed)."""
