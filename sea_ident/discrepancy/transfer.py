@@ -10,6 +10,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.contribution import as_known
 from sea_ident.discrepancy.fit import Fit, Known
+from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, significance
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.search import Selection
@@ -172,7 +173,7 @@ class _Trial:
             if fixed.statistic - without.statistic < EQUALLY_GOOD * unit:
                 # what the others gain by a refit is not there for this one to explain: this motion may hardly show it
                 tested = self._tells(without, alone().statistic)
-            share = max(share, self._share_beside_free())
+            share = max(share, self._share_beside_free(), self._share_by_values())
         possible = without.statistic - min(free.statistic, fixed.statistic)
         return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers, possible)
 
@@ -196,6 +197,24 @@ class _Trial:
         if not self._tells(without, min(self._now.fit.statistic, fixed.statistic)):
             return 0.0
         return self._share(without, fixed, self._now.fit)
+
+    def _share_by_values(self) -> float:
+        """The same by the values that the other data would have of an effect without shapes; 0 where they tell none.
+
+        To second order a model loses v' C^-1 v without values v of covariance C, and d' C^-1 d with values that are off
+        by d. It is what the comparison of statistics comes to where others do not change their shapes with it.
+        """
+        if isinstance(self._effect, SignalEffect) or free_shapes((self._effect,)):
+            return 0.0
+        found, there = (
+            [fit.parameters[c.name] for c in self._effect.columns(self._bench.robot)]
+            for fit in (self._fit, self._now.fit)
+        )
+        start = sum(self._bench.counts(self._now.fit.effects)[: self._position])
+        factor = self._now.fit.covariance_factor[start : start + len(there)]
+        values = np.array([there, np.subtract(there, found)])
+        lost = np.sum(values * np.linalg.lstsq(factor @ factor.T, values.T, rcond=None)[0].T, axis=1)
+        return float(1.0 - lost[1] / lost[0]) if lost[0] > EQUALLY_GOOD else 0.0
 
     def _least(self, known: Known, *more: Sequence[Effect]) -> Fit:
         """The model with some effects more and the torque of others as it is known."""

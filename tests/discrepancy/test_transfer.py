@@ -5,7 +5,7 @@ import pytest
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
-from sea_ident.discrepancy.transfer import Transfer, transfer
+from sea_ident.discrepancy.transfer import Transfer, _Trial, transfer
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
@@ -87,3 +87,20 @@ def test_friction_that_turns_over_at_another_speed_is_not_held_against_an_effect
 def test_what_explains_less_than_is_missing_beside_it_is_not_ruled_out_by_half(share, possible, excess, out):
     assert Transfer(share, True, excess=excess, possible=possible).ruled_out == out
     assert not Transfer(share, False, excess=excess, possible=possible).ruled_out
+
+
+def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory):
+    """To second order: an offset of 4 that is said to be 1 leaves nine sixteenths of what it explains."""
+    ripple = ("torque_ripple", "hip", [0.4, 0.0], {"order": 24.0})
+    used = [("torque_offset", "ankle", [0.7], {}), ("torque_offset", "knee", [1.0], {}), ripple]
+    there = [("torque_offset", "ankle", [0.7], {}), ("torque_offset", "knee", [4.0], {}), ripple]
+    bench = laboratory.bench(laboratory.record(used, periods=6))
+    start = settle(bench, bench.effects)
+    fit = settle(bench, (*bench.effects, *(make_effect(n, j, **shapes) for n, j, _, shapes in used))).fit
+    other = Bench(laboratory.data(laboratory.record(there, periods=6, motion=1, seed=8)), bench.effects)
+    now = settle_again(other, other.predicted(fit.effects, fit.parameters))
+    added = range(len(start.fit.effects), len(fit.effects))
+    same, less, shaped = (_Trial(other, fit, added, now, position)._share_by_values() for position in added)
+    assert same == pytest.approx(1.0, abs=0.01)
+    assert less == pytest.approx(1.0 - (3.0 / 4.0) ** 2, abs=0.02)
+    assert shaped == 0.0  # its order is found too
