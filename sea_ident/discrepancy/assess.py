@@ -20,7 +20,6 @@ from sea_ident.discrepancy.judge import (
     flat_steps,
     never_closed,
     penalty,
-    physical,
     slowest,
     spread,
     too_short,
@@ -28,6 +27,7 @@ from sea_ident.discrepancy.judge import (
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, closed_freedom, unstacked
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.powers import with_its_power
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.search import Selection

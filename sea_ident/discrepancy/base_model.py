@@ -11,9 +11,10 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.judge import physical, significance
+from sea_ident.discrepancy.judge import significance
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import Effect

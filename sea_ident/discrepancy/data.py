@@ -228,6 +228,12 @@ def wide_processing(
     return process(recording, robot, period=first.period, link_harmonics=fewer, motor_harmonics=fewer)
 
 
+def scatter_of_passes(passes: FloatArray) -> FloatArray:
+    """(n,) standard deviation of a signal (P, N, n) from pass to pass, whatever drifts: the median over a period."""
+    scatter: FloatArray = np.median(np.std(np.diff(passes, axis=0), axis=0), axis=0) / np.sqrt(2.0)
+    return scatter
+
+
 def _blur(motions: Sequence[Motion]) -> float:
     """Largest scatter of a velocity between periods, in units of what may be uncertain of its sign [-]."""
     if len(motions) < 2:
@@ -235,7 +241,7 @@ def _blur(motions: Sequence[Motion]) -> float:
     largest = 0.0
     for name in ("dq", "dtheta"):
         speeds = np.stack([getattr(motion, name) for motion in motions])
-        scatter = np.median(np.std(np.diff(speeds, axis=0), axis=0), axis=0) / np.sqrt(2.0)
+        scatter = scatter_of_passes(speeds)
         rms = np.sqrt(np.mean(speeds**2, axis=(0, 1)))
         moving = rms > 0.0
         largest = max(largest, float(np.max(UNCERTAIN_SIGN * scatter[moving] / (SLOWEST * rms[moving]), initial=0.0)))

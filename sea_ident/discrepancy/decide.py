@@ -11,7 +11,8 @@ from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
 from sea_ident.discrepancy.heldout import HeldOut
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty, physical
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.remembering import remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled

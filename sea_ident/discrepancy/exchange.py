@@ -9,7 +9,8 @@ from sea_ident.discrepancy.candidates import scan, sought
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.fit import Solution
 from sea_ident.discrepancy.free_shapes import is_signal
-from sea_ident.discrepancy.judge import at_a_bound, comes_first, is_push, penalty, physical, slowest, too_short
+from sea_ident.discrepancy.judge import at_a_bound, comes_first, is_push, penalty, slowest, too_short
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.side_by_side import side_by_side

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.freed import Freed
 from sea_ident.discrepancy.linear import off, solve, solve_near
 from sea_ident.discrepancy.noise import ComplexArray
@@ -137,6 +137,11 @@ class Fit:
     def std(self, index: int) -> float:
         """Standard deviation of a parameter (index < p) or a shape (p + position in `free_shapes`)."""
         return float(np.linalg.norm(self.covariance_factor[index]))
+
+    def lost_by(self, rows: slice | IntArray, values: FloatArray) -> float:
+        """By how much the statistic grows, to second order, where parameters are off by values (k,): v' C^-1 v."""
+        factor = self.covariance_factor[rows]
+        return float(values @ np.linalg.lstsq(factor @ factor.T, values, rcond=None)[0])
 
     def slice_of(self, position: int, robot_columns: Sequence[int]) -> slice:
         """Columns of one effect, given the number of columns of every effect."""

@@ -19,16 +19,15 @@ from sea_ident.discrepancy.judge import (
     comes_first,
     flat_steps,
     is_push,
-    is_term,
     own_torque,
     penalty,
-    possible,
     scatter_p,
     significance,
     too_short,
     torque_change,
     torque_changes,
 )
+from sea_ident.discrepancy.physics import is_term, possible
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.side_by_side import side_by_side

@@ -12,17 +12,7 @@ from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.edges import sharpened
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
-from sea_ident.discrepancy.judge import (
-    at_a_bound,
-    bends_another,
-    is_push,
-    own_torque,
-    physical,
-    possible,
-    significance,
-    torque_change,
-    torque_changes,
-)
+from sea_ident.discrepancy.judge import at_a_bound, is_push, own_torque, significance, torque_change, torque_changes
 from sea_ident.discrepancy.kinks import with_their_kinks
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import (
@@ -33,6 +23,7 @@ from sea_ident.discrepancy.next_effect import (
     next_effect,
     visible_changes,
 )
+from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect, JointEffect

@@ -206,15 +206,11 @@ class _Trial:
         """
         if isinstance(self._effect, SignalEffect) or free_shapes((self._effect,)):
             return 0.0
-        found, there = (
-            [fit.parameters[c.name] for c in self._effect.columns(self._bench.robot)]
-            for fit in (self._fit, self._now.fit)
-        )
-        start = sum(self._bench.counts(self._now.fit.effects)[: self._position])
-        factor = self._now.fit.covariance_factor[start : start + len(there)]
-        values = np.array([there, np.subtract(there, found)])
-        lost = np.sum(values * np.linalg.lstsq(factor @ factor.T, values.T, rcond=None)[0].T, axis=1)
-        return float(1.0 - lost[1] / lost[0]) if lost[0] > EQUALLY_GOOD else 0.0
+        there = self._now.fit
+        own = there.slice_of(self._position, self._bench.counts(there.effects))
+        found = np.array([self._fit.parameters[column.name] for column in self._effect.columns(self._bench.robot)])
+        without = there.lost_by(own, there.values[own])
+        return 1.0 - there.lost_by(own, found - there.values[own]) / without if without > EQUALLY_GOOD else 0.0
 
     def _least(self, known: Known, *more: Sequence[Effect]) -> Fit:
         """The model with some effects more and the torque of others as it is known."""

@@ -30,9 +30,10 @@ from sea_ident.discrepancy.findings import (
     Verdict,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import at_a_bound, own_torque, physical, significance, torque_change
+from sea_ident.discrepancy.judge import at_a_bound, own_torque, significance, torque_change
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.settle import Settled, settle, settle_again

@@ -7,7 +7,8 @@ import pytest
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, physical
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.refit import _open, refitted
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect

@@ -89,7 +89,7 @@ def test_what_explains_less_than_is_missing_beside_it_is_not_ruled_out_by_half(s
     assert not Transfer(share, False, excess=excess, possible=possible).ruled_out
 
 
-def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory):
+def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory, monkeypatch):
     """To second order: an offset of 4 that is said to be 1 leaves nine sixteenths of what it explains."""
     ripple = ("torque_ripple", "hip", [0.4, 0.0], {"order": 24.0})
     used = [("torque_offset", "ankle", [0.7], {}), ("torque_offset", "knee", [1.0], {}), ripple]
@@ -104,3 +104,10 @@ def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory):
     assert same == pytest.approx(1.0, abs=0.01)
     assert less == pytest.approx(1.0 - (3.0 / 4.0) ** 2, abs=0.02)
     assert shaped == 0.0  # its order is found too
+    # and that counts where the comparison of statistics speaks against it
+    monkeypatch.setattr(_Trial, "_share", staticmethod(lambda without, fixed, free: 0.0))
+    monkeypatch.setattr(_Trial, "_share_beside_free", lambda self: 0.0)
+    outcomes = [_Trial(other, fit, added, now, position).outcome() for position in added]
+    assert [outcome.tested for outcome in outcomes] == [True, True, True]
+    assert [outcome.share for outcome in outcomes] == [same, less, shaped]
+    assert [outcome.holds for outcome in outcomes] == [True, False, False]

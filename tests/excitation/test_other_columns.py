@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sea_ident.effects import effect_classes
-from sea_ident.excitation.columns import STATES, ModelColumns
+from sea_ident.excitation.columns import ModelColumns
+from sea_ident.excitation.other_columns import STATES
 from sea_ident.motion import Motion
 
 SAMPLES = 150
