@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.breakaway import LEVEL, breakaway_p
-from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
@@ -20,7 +20,6 @@ from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import MOST_EFFECTS
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
-from sea_ident.effects import Effect
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.stribeck_friction import StribeckFriction
 
@@ -55,18 +54,20 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     begun: set[str | None] = set()
     while before.added + len(added) < MOST_EFFECTS and lack_of_fit(near, now)[2] < LACK_LEVEL:
         few = [e for e in candidate_effects(near, now.fit.effects) if e.name in LIVE_BESIDE_REVERSALS]
-        step = _next(near, now, before.start.fit, few)
-        if step is None:
-            break
-        joint = step[0].effects[-1].joint
-        if joint not in begun:
+        candidates = scan(near, now.fit, now.noise, few)
+        # a friction that starts to slide where it does not may keep any other from being possible beside it
+        joint = candidates[0].effect.joint if candidates else None
+        if joint is not None and joint not in begun:
             begun.add(joint)
             again = with_sliding_start(near, now, joint)
-            if again.fit.statistic < now.fit.statistic - EQUALLY_GOOD:
+            if again is not now:
                 now = again
                 continue
+        step = _next(near, now, before.start.fit, candidates)
+        if step is None:
+            break
         # all others only where one of the few may be it: mostly none is
-        step = _next(near, now, before.start.fit, None)
+        step = _next(near, now, before.start.fit, scan(near, now.fit, now.noise))
         if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:
             break
         added.append(step[1])
@@ -129,12 +130,12 @@ def with_sliding_start(near: Bench, now: Settled, joint: str | None) -> Settled:
             best = min(
                 best, near.fit(other, now.noise, start=now.fit.parameters, tangents=False), key=lambda f: f.statistic
             )
-    return now if best is now.fit else settle_again(near, best)
+    # held against each other in one noise floor: that of the better one is lower, and what it leaves counts more there
+    return settle_again(near, best) if best.statistic < now.fit.statistic - EQUALLY_GOOD else now
 
 
-def _next(near: Bench, now: Settled, start: Fit, effects: Sequence[Effect] | None) -> tuple[Fit, float] | None:
-    """The best of some effects, or of the whole library, refitted with everything free, and its significance."""
+def _next(near: Bench, now: Settled, start: Fit, candidates: Sequence[Candidate]) -> tuple[Fit, float] | None:
+    """The best of some candidates refitted with everything free, and its significance."""
     change = torque_changes(near, start, now.fit) if len(now.fit.effects) > len(start.effects) else 0.0
     smallest = np.broadcast_to(np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * change), now.fit.scale.shape)
-    candidates = scan(near, now.fit, now.noise, effects)
     return next_effect(near, now, candidates, max(sum(c.tests for c in candidates), 1), smallest)

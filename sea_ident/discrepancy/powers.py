@@ -19,7 +19,10 @@ OTHER_POWER = 1.2
 """Factor between the cube and the powers, a higher and a lower one, from which another is found."""
 
 WORTH_A_POWER = 0.5
-"""Share of what the cube leaves that another power may leave [-]."""
+"""Share of what the cube leaves that another power may leave [-], ..."""
+
+PROMISES_A_POWER = 0.8
+"""... and that it may leave at first, in the noise of the cube: one that is worth it leaves about a tenth even there."""
 
 ANOTHER_POWER = 0.99
 """Factor between a power of the deflection that a search tried and the one from which its own is found."""
@@ -45,8 +48,13 @@ def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
             continue
         if lack_of_fit(bench, now)[2] >= LACK_LEVEL:
             break
-        found = [_followed(bench, now, position, factor * CUBE) for factor in (OTHER_POWER, 1.0 / OTHER_POWER)]
-        other = min(found, key=lambda each: each.fit.excess)
+        found = [_from_a_power(bench, now, position, factor * CUBE) for factor in (OTHER_POWER, 1.0 / OTHER_POWER)]
+        best = min(found, key=lambda fit: fit.excess)
+        if best.excess > PROMISES_A_POWER * now.fit.excess:
+            continue
+        other = Settled(best, now.noise)
+        for _ in range(MOST_ROUNDS):
+            other = settle_again(bench, other.fit)
         if other.fit.excess < WORTH_A_POWER * now.fit.excess:
             now = other
     return now
@@ -73,11 +81,8 @@ def with_its_power(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> 
     return other if other.statistic < fit.statistic else fit
 
 
-def _followed(bench: Bench, now: Settled, position: int, power: float) -> Settled:
-    """A model with a saturation whose power is found from a given one, settled."""
+def _from_a_power(bench: Bench, now: Settled, position: int, power: float) -> Fit:
+    """A model with a saturation whose power is found from a given one."""
     effects = list(now.fit.effects)
     effects[position] = replace(effects[position], exponent=power)  # type: ignore[call-arg]
-    other = Settled(bench.refine(effects, now.noise, start=now.fit.parameters), now.noise)
-    for _ in range(MOST_ROUNDS):
-        other = settle_again(bench, other.fit)
-    return other
+    return bench.refine(effects, now.noise, start=now.fit.parameters)
