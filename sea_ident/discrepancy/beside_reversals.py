@@ -1,6 +1,5 @@
 """Friction that acts only beside reversals, in samples that a search leaves out: those are compared, for it alone."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -75,10 +74,10 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     if not added:
         return bench, replace(confirmed, beside=(near, now))
     start = settle_again(near, before.start.fit)
-    candidates = tuple(scan(near, now.fit, now.noise))
+    found = tuple(scan(near, now.fit, now.noise))
     selection = replace(
         before, start=start, final=now, added=before.added + len(added), p_values=(*before.p_values, *added),
-        candidates=candidates, tests=max(sum(c.tests for c in candidates), 1),
+        candidates=found, tests=max(sum(c.tests for c in found), 1),
     )  # fmt: skip
     return near, Confirmed(selection, near, start, now, beside=(near, now))
 
@@ -134,7 +133,7 @@ def with_sliding_start(near: Bench, now: Settled, joint: str | None) -> Settled:
     return settle_again(near, best) if best.statistic < now.fit.statistic - EQUALLY_GOOD else now
 
 
-def _next(near: Bench, now: Settled, start: Fit, candidates: Sequence[Candidate]) -> tuple[Fit, float] | None:
+def _next(near: Bench, now: Settled, start: Fit, candidates: list[Candidate]) -> tuple[Fit, float] | None:
     """The best of some candidates refitted with everything free, and its significance."""
     change = torque_changes(near, start, now.fit) if len(now.fit.effects) > len(start.effects) else 0.0
     smallest = np.broadcast_to(np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * change), now.fit.scale.shape)

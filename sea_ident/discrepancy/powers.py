@@ -22,7 +22,7 @@ WORTH_A_POWER = 0.5
 """Share of what the cube leaves that another power may leave [-], ..."""
 
 PROMISES_A_POWER = 0.8
-"""... and that it may leave at first, in the noise of the cube: one that is worth it leaves about a tenth even there."""
+"""... and that it may leave at first, in the noise of the cube: one that is worth it leaves about a tenth there too."""
 
 ANOTHER_POWER = 0.99
 """Factor between a power of the deflection that a search tried and the one from which its own is found."""

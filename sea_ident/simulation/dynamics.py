@@ -12,7 +12,7 @@ from sea_ident.robot.model import rotor_body
 from sea_ident.simulation.controller import Drive
 from sea_ident.simulation.friction import JointFriction
 from sea_ident.simulation.plant import Plant
-from sea_ident.simulation.planted import PlantedTorques, motor_coordinates
+from sea_ident.simulation.planted import PlantedTorques, coordinate_map, motor_coordinates
 from sea_ident.simulation.rosenbrock import RosenbrockW
 
 LOAD_ROUNDS = 3
@@ -51,10 +51,7 @@ class ClosedLoop:
         self.elastic = [int(i) for i in robot.elastic_indices]
         self.motor = motor_coordinates(robot)
         self.size = size = n + len(self.elastic)
-        self._map = np.zeros((robot.extended_model.nv, size))
-        self._map[:, :n] = robot.link_map
-        for i in range(n):
-            self._map[:, self.motor[i]] += robot.motor_map[:, i]
+        self._map = coordinate_map(robot)
         self._map_t = np.ascontiguousarray(self._map.T)
         self._offset = robot.offset if np.any(robot.offset) else None
         self._model = robot.extended_model
@@ -62,8 +59,8 @@ class ClosedLoop:
 
         self._inverse: FloatArray | None = None
         if len(self._map) == size and np.linalg.matrix_rank(self._map) == size:
-            self._inverse = np.linalg.inv(self._map)
-            self._inverse_t = np.ascontiguousarray(self._inverse.T)
+            inverse: FloatArray = np.linalg.inv(self._map)
+            self._inverse, self._inverse_t = inverse, np.ascontiguousarray(inverse.T)
 
         self._bodies: pin.Model | None = None
         if planted is not None and planted.needs_load:

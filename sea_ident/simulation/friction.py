@@ -43,6 +43,10 @@ class FrictionLaw(ABC):
     def start(self, viscous: float, coulomb: float, position: float) -> JointFriction:
         """Friction of one joint side at rest at `position`; viscous [N m s/rad], Coulomb [N m]."""
 
+    @abstractmethod
+    def steepest(self, coulomb: float) -> float:
+        """Largest slope of Coulomb friction [N m] over the speed [N m s/rad]."""
+
 
 @dataclass(frozen=True)
 class SmoothCoulomb(FrictionLaw):
@@ -69,6 +73,10 @@ class SmoothCoulomb(FrictionLaw):
     def start(self, viscous: float, coulomb: float, position: float) -> JointFriction:
         """Friction without memory."""
         return _SmoothJoint(viscous, coulomb, self.smoothing)
+
+    def steepest(self, coulomb: float) -> float:
+        """The slope at rest."""
+        return coulomb / self.smoothing
 
 
 class _SmoothJoint:
@@ -107,6 +115,10 @@ class PreslidingCoulomb(FrictionLaw):
     def start(self, viscous: float, coulomb: float, position: float) -> JointFriction:
         """Friction with an unloaded contact."""
         return _PreslidingJoint(viscous, coulomb, self.deflection, position)
+
+    def steepest(self, coulomb: float) -> float:
+        """None: it depends on the position."""
+        return 0.0
 
 
 class _PreslidingJoint:

@@ -30,6 +30,15 @@ def motor_coordinates(robot: Robot) -> list[int]:
     return motors
 
 
+def coordinate_map(robot: Robot) -> FloatArray:
+    """(nv, size) position of Pinocchio's model, without its offset, from u = (q, theta of the elastic joints)."""
+    out = np.zeros((robot.extended_model.nv, robot.n + len(robot.elastic_indices)))
+    out[:, : robot.n] = robot.link_map
+    for i, motor in enumerate(motor_coordinates(robot)):
+        out[:, motor] += robot.motor_map[:, i]
+    return out
+
+
 class _Instant(NamedTuple):
     """Time and coordinates (size,) as numbers, torques (n,)."""
 

@@ -183,7 +183,6 @@ def record_project(
             friction=SmoothCoulomb(case.friction_smoothing),
             effects=effects,
             controller=ComputedTorque(plant) if robot.elastic_indices.size else None,
-            step=2.5e-3,
         )
     columns = {k: v for k, v in result.recording.columns.items() if "reference" not in k}
     return Recording(result.recording.time, columns, name)

@@ -1,0 +1,76 @@
+"""The step that a simulation takes by itself resolves how friction turns over at a reversal."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plants import baxter_arm, modest_series, ur10
+
+from sea_ident.simulation import (
+    FrictionJitter,
+    PreslidingCoulomb,
+    SensorNoise,
+    SmoothCoulomb,
+    plant_from_robot,
+    simulate,
+)
+from sea_ident.simulation.reference import PeriodicReference
+from sea_ident.simulation.usual_step import LONGEST, SHORTEST, usual_step
+
+FRICTION = np.array([6.7, 8.0, 6.4, 0.0, 0.0, 0.0])
+"""Coulomb friction of a rigid arm of which the inertia of the rotors is not known, wrist apart [N m]."""
+
+
+@pytest.fixture(scope="module")
+def arm():
+    robot = ur10()
+    plant = replace(plant_from_robot(robot), coulomb_friction=FRICTION)
+    return robot, plant, modest_series(robot, base_frequency=0.2, harmonics=5)
+
+
+def steps(robot, plant, law, series):
+    return usual_step(plant, [law] * robot.n, PeriodicReference(series))
+
+
+def test_a_light_joint_with_much_friction_is_not_thrown_back_where_it_reverses(arm):
+    robot, plant, series = arm
+
+    def run(step):
+        return simulate(
+            robot, series, periods=1, plant=plant, step=step, friction=SmoothCoulomb(0.009),
+            sensors=SensorNoise.none(), jitter=FrictionJitter.none(),
+        )  # fmt: skip
+
+    usual, exact, long = run(None), run(1.25e-4), run(LONGEST)
+    assert usual.step < LONGEST
+    assert np.abs(usual.motion.q - exact.motion.q).max() < 2e-5
+    assert np.abs(usual.motion.dq - exact.motion.dq).max() < 2e-3
+    assert np.abs(long.motion.dq - exact.motion.dq).max() > 5e-3
+
+
+def test_friction_of_geared_joints_with_springs_needs_no_shorter_step(leg, leg_series):
+    for robot, series in ((leg, leg_series), (baxter_arm(), None)):
+        plant = plant_from_robot(robot)
+        assert steps(robot, plant, SmoothCoulomb(), series or modest_series(robot)) == LONGEST
+
+
+def test_the_step_goes_with_the_smoothing_and_the_friction_to_an_end(arm):
+    robot, plant, series = arm
+    usual = steps(robot, plant, SmoothCoulomb(0.009), series)
+    assert SHORTEST < usual < LONGEST
+    assert steps(robot, plant, SmoothCoulomb(0.009 / 2.0), series) == pytest.approx(usual / 2.0)
+    more = replace(plant, coulomb_friction=2.0 * FRICTION)
+    assert steps(robot, more, SmoothCoulomb(0.009), series) == pytest.approx(usual / 2.0)
+    assert steps(robot, plant, SmoothCoulomb(1e-5), series) == SHORTEST
+    assert steps(robot, plant, PreslidingCoulomb(), series) == LONGEST
+
+
+def test_friction_of_a_link_counts_too(leg, leg_series):
+    plant = plant_from_robot(leg)
+    heavy = replace(plant, link_coulomb_friction=np.full(3, 20.0))
+    assert steps(leg, heavy, SmoothCoulomb(), leg_series) < steps(leg, plant, SmoothCoulomb(), leg_series)
+
+
+def test_a_step_that_is_given_is_taken(arm):
+    robot, plant, series = arm
+    assert simulate(robot, series, periods=1, plant=plant, step=5e-3).step == pytest.approx(5e-3)
