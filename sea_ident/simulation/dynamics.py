@@ -59,7 +59,7 @@ class ClosedLoop:
 
         self._inverse: FloatArray | None = None
         if len(self._map) == size and np.linalg.matrix_rank(self._map) == size:
-            inverse: FloatArray = np.linalg.inv(self._map)
+            inverse = np.asarray(np.linalg.inv(self._map), dtype=np.float64)
             self._inverse, self._inverse_t = inverse, np.ascontiguousarray(inverse.T)
 
         self._bodies: pin.Model | None = None
