@@ -1,25 +1,22 @@
 """Whether what was found holds away from the reversals too, and what can be found only there."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.data import BARELY_SEEN, PeriodData, away_from_reversals
+from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import flat_steps, is_push, scatter_p, significance, torque_change
+from sea_ident.discrepancy.judge import flat_steps, scatter_p, significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 
 FAR = 6
-"""How many times the usual is left out around reversals where the search is repeated without what is slow, and where a
-push must hold."""
+"""How many times the usual is left out around reversals where the search is repeated without what is slow."""
 
 MOST_LEFT_OUT = 0.6
 """Share of the samples of an equation beyond which too little is left to search [-]."""
@@ -68,9 +65,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
 
     What the others say must stand out of the scatter of the periods as well: friction that differs from pass to pass
     does so beyond the samples that are left out, and has another mean over the passes of every recording. Stiction
-    stays that every pass shows where its motor is let go. A push fits whatever happens at certain times, and must hold
-    farther from the reversals: where a motor lingers before it turns, a speed within the band misses for long that it
-    stands.
+    stays that every pass shows where its motor is let go.
 
     Args:
         bench: the recording.
@@ -84,63 +79,22 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     if not selection.added:
         return Confirmed(selection, away, start, start)
     final = settle_again(away, selection.final.fit)
-    speaks = _Speaks(away, final, selection.tests)
+    steps = flat_steps(away, final)
     weak = []
     first = len(final.fit.effects) - selection.added
     for k in range(selection.added):
-        less = speaks.without(first + k)
-        if not speaks.enough_for(first + k, less):
-            others = [e for position, e in enumerate(final.fit.effects) if position != first + k]
+        others = [e for position, e in enumerate(final.fit.effects) if position != first + k]
+        less = away.refine(others, final.noise, start=final.fit.parameters, only=len(away.effects))
+        loss = less.statistic - final.fit.statistic
+        columns = max(len(final.fit.effects[first + k].columns(away.robot)), 1)
+        p_value = significance(loss, columns, selection.tests, less, final.noise)
+        by_chance = max(p_value, scatter_p(steps, less.whitened - final.fit.whitened))
+        if by_chance > FAMILY_LEVEL or torque_change(away, final.fit, less) < SMALLEST_SHARE:
             rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
             if not lets_go_late(bench, rest, final.fit.effects[first + k]):
                 weak.append(k)
-    pushes = [k for k in range(selection.added) if k not in weak and is_push(final.fit.effects[first + k])]
-    data = away_from_reversals(bench.data, FAR)
-    if pushes and _compares_enough(data):
-        far = bench.comparing(data)
-        speaks = _Speaks(far, settle_again(far, selection.final.fit), selection.tests)
-        weak += [k for k in pushes if not speaks.enough_for(first + k, speaks.without(first + k))]
     found = Confirmed(selection, away, start, final)
     return found.less(without(bench, selection, weak)) if weak else found
-
-
-@dataclass(frozen=True, eq=False)
-class _Speaks:
-    """What some samples say of effects.
-
-    Attributes:
-        bench: the recording with these samples.
-        final: the model with the effects, there.
-        tests: number of shapes of all candidates.
-    """
-
-    bench: Bench
-    final: Settled
-    tests: int
-
-    def without(self, position: int) -> Fit:
-        """The model without the effect at a position."""
-        fit = self.final.fit
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        return self.bench.refine(others, self.final.noise, start=fit.parameters, only=len(self.bench.effects))
-
-    def enough_for(self, position: int, less: Fit) -> bool:
-        """Whether they speak for the effect at a position by more than chance, given the model without it."""
-        bench, fit = self.bench, self.final.fit
-        loss = less.statistic - fit.statistic
-        columns = max(len(fit.effects[position].columns(bench.robot)), 1)
-        p_value = significance(loss, columns, self.tests, less, self.final.noise)
-        by_chance = max(p_value, scatter_p(self._steps, less.whitened - fit.whitened))
-        return by_chance <= FAMILY_LEVEL and torque_change(bench, fit, less) >= SMALLEST_SHARE
-
-    @cached_property
-    def _steps(self) -> FloatArray:
-        return flat_steps(self.bench, self.final)
-
-
-def _compares_enough(data: PeriodData) -> bool:
-    """Whether enough is left to say something of what is missing."""
-    return bool(np.all(np.mean(data.left_out, axis=0) <= MOST_LEFT_OUT))
 
 
 def _begun(far: Bench, confirmed: Confirmed, before: Settled) -> Selection | None:
@@ -188,7 +142,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
         What is found without them; None where it explains the rest no better.
     """
     data = away_from_reversals(bench.data, FAR)
-    if not _compares_enough(data):
+    if np.any(np.mean(data.left_out, axis=0) > MOST_LEFT_OUT):
         return None
     far = bench.comparing(data)
     before = settle_again(far, confirmed.final.fit)
