@@ -1,7 +1,7 @@
 """`diagnose`: where a model and a recording disagree, and which effect is missing."""
 
 import warnings as python_warnings
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from sea_ident._typing import FloatArray
@@ -48,6 +48,7 @@ from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
+from sea_ident.side_by_side import side_by_side
 from sea_ident.simulation import Controller
 
 Progress = Callable[[str, float], None]
@@ -145,8 +146,9 @@ def diagnose(
     as_identified = _as_identified(recording, processed, robot)
     change, change_notes = _against(reference, as_identified, bench.data)
     tell("simulating", 0.85)
-    repaired = repaired_model(model, as_identified, selection.final.fit)
-    forward = _forward(model, repaired, selection, held, recording, processed, controller)
+    fits = [(as_identified, selection.final.fit), *([(processed, selection.start.fit)] if selection.added else [])]
+    repaired, *before = side_by_side(lambda given: repaired_model(model, *given), fits)
+    forward = _forward(before, repaired, held, recording, processed, controller)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
     said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *forward.notes)
@@ -335,21 +337,20 @@ def _against(
 
 
 def _forward(
-    model: Model,
+    before: Sequence[Model | None],
     repaired: Model | None,
-    selection: Selection,
     held: HeldOut | None,
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None,
 ) -> SimulationGap:
     """Forward simulation before and after, on another motion where there is one; nothing where nothing was added."""
-    before = repaired_model(model, processed, selection.start.fit) if selection.added else None
-    if before is None or repaired is None:
+    (first,) = before or (None,)
+    if first is None or repaired is None:
         return SimulationGap({}, ())
     if held is not None and held.processed is not None and held.recording is not None:
-        return simulation_gap(before, repaired, held.recording, held.processed, controller)
-    found = simulation_gap(before, repaired, recording, processed, controller)
+        return simulation_gap(first, repaired, held.recording, held.processed, controller)
+    found = simulation_gap(first, repaired, recording, processed, controller)
     same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
     return replace(found, notes=(*same, *found.notes))
 

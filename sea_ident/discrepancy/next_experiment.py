@@ -8,7 +8,7 @@ of each in the noise of the recording, the worse of both counting.
 """
 
 import warnings as python_warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -31,6 +31,7 @@ from sea_ident.exceptions import SeaIdentError
 from sea_ident.excitation import Criterion, Discrimination, DOptimality, Excitation, PredictedMotors, design_excitation
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.robot import Robot
+from sea_ident.side_by_side import side_by_side
 from sea_ident.simulation import plant_from_identified
 
 HARMONICS = 6
@@ -102,14 +103,18 @@ def propose(
     robot, motors = _identified(model)
     best: tuple[float, list[float], Excitation] | None = None
     reasons: list[str] = []
-    for excitation in _designs(robot, motors, bench, noise, pairs[0], reasons):
-        other = Bench(_data_of(bench.data, robot, excitation.series, motors), bench.effects)
-        there = [separation(other, noise, pair) for pair in pairs]
+    attempts = side_by_side(_Attempt(bench, noise, pairs, robot, motors), _plans(robot, pairs[0]))
+    for attempt in attempts:
+        if isinstance(attempt, str):
+            reasons.append(attempt)
+            continue
+        excitation, there = attempt
         score = float(np.sum(np.log(np.maximum(there, 1.0))))
         if best is None or score > best[0]:
             best = (score, there, excitation)
         if min(there) > PLENTY:
             break
+    attempts.close()
     first, second = pairs[0].names
     if best is None:
         return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
@@ -151,44 +156,78 @@ def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: F
     return float(signal @ signal)
 
 
-def _designs(
-    robot: Robot,
-    motors: PredictedMotors | None,
-    bench: Bench,
-    noise: NoiseFloor,
-    pair: Pair,
-    reasons: list[str],
-) -> Iterator[Excitation]:
-    """Motions designed for the columns of a pair, then motions that are wide in all.
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """What a motion is to be designed for.
+
+    Attributes:
+        criterion: what it is to bring.
+        effects: whose columns it is to show; all usual ones where None.
+        springs: whether springs are among them.
+        seed: of the starts.
+    """
+
+    criterion: Criterion
+    effects: tuple[Effect, ...] | None
+    springs: bool
+    seed: int
+
+
+def _plans(robot: Robot, pair: Pair) -> list[_Plan]:
+    """Motions for the columns of a pair first, then motions that are wide in all.
 
     Effects that show only beyond some border (play, the end of a range) have no slope to follow where a design starts.
     """
-    known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
+    plans = [_Plan(DOptimality(), None, False, seed) for seed in SEEDS]
     own, rival = pair.own.effects[pair.own_position], pair.rival.effects[pair.rival_position]
-    rows = _row_noise(bench, noise)
-    plans: list[tuple[Criterion, Sequence[Effect] | None, int]] = [(DOptimality(), None, seed) for seed in SEEDS]
     if own.columns(robot) and rival.columns(robot):
-        plans.insert(0, (Discrimination(own, (rival,)), known, SEEDS[0]))
-    for criterion, effects, seed in plans:
-        springs = effects is not None and any(e.side is Side.SPRING for e in (*effects, own, rival))
+        known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
+        springs = any(e.side is Side.SPRING for e in (*known, own, rival))
+        plans.insert(0, _Plan(Discrimination(own, (rival,)), known, springs, SEEDS[0]))
+    return plans
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """Designs motions and asks them to tell effects from each other.
+
+    Attributes:
+        bench: the recording that does not.
+        noise: its noise floor.
+        pairs: the effect with each alternative.
+        robot: with the bodies that were identified.
+        motors: where they are, in a motion of the links.
+    """
+
+    bench: Bench
+    noise: NoiseFloor
+    pairs: Sequence[Pair]
+    robot: Robot
+    motors: PredictedMotors | None
+
+    def __call__(self, plan: _Plan) -> tuple[Excitation, list[float]] | str:
+        """The motion of a plan and what it shows of every pair; why there is none, where there is none."""
+        bench = self.bench
         try:
             with python_warnings.catch_warnings():
                 python_warnings.simplefilter("ignore")
-                yield design_excitation(
-                    robot,
+                excitation = design_excitation(
+                    self.robot,
                     base_frequency=1.0 / bench.data.period,
                     harmonics=HARMONICS,
                     starts=STARTS,
-                    seed=seed,
-                    criterion=criterion,
-                    effects=effects,
-                    motors=motors if springs else None,
-                    noise=rows if springs else None,
+                    seed=plan.seed,
+                    criterion=plan.criterion,
+                    effects=plan.effects,
+                    motors=self.motors if plan.springs else None,
+                    noise=_row_noise(bench, self.noise) if plan.springs else None,
                     rate=_rate(bench),
                     jobs=1,
                 )
         except (SeaIdentError, np.linalg.LinAlgError) as error:
-            reasons.append(str(error))
+            return str(error)
+        there = Bench(_data_of(bench.data, self.robot, excitation.series, self.motors), bench.effects)
+        return excitation, [separation(there, self.noise, pair) for pair in self.pairs]
 
 
 def _rate(bench: Bench) -> float:
