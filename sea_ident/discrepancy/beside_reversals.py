@@ -51,20 +51,26 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     now = settle_again(near, before.final.fit)
     now, added = _let_go_late(near, now, MOST_EFFECTS - before.added)
     begun: set[str | None] = set()
+
+    def other_start(joint: str | None) -> bool:
+        """Whether the friction of a joint starts to slide elsewhere than it did; asked of every joint once."""
+        nonlocal now
+        last = now
+        now = now if joint in begun else with_sliding_start(near, now, joint)
+        begun.add(joint)
+        return now is not last
+
     while before.added + len(added) < MOST_EFFECTS and lack_of_fit(near, now)[2] < LACK_LEVEL:
         few = [e for e in candidate_effects(near, now.fit.effects) if e.name in LIVE_BESIDE_REVERSALS]
         candidates = scan(near, now.fit, now.noise, few)
         # a friction that starts to slide where it does not may keep any other from being possible beside it
-        joint = candidates[0].effect.joint if candidates else None
-        if joint is not None and joint not in begun:
-            begun.add(joint)
-            again = with_sliding_start(near, now, joint)
-            if again is not now:
-                now = again
-                continue
+        if candidates and other_start(candidates[0].effect.joint):
+            continue
         step = _next(near, now, before.start.fit, candidates)
         if step is None:
             break
+        if other_start(step[0].effects[-1].joint):
+            continue
         # all others only where one of the few may be it: mostly none is
         step = _next(near, now, before.start.fit, scan(near, now.fit, now.noise))
         if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:
