@@ -16,12 +16,11 @@ LONGEST = 2.5e-3
 SHORTEST = 5e-4
 """... and where it asks for next to nothing [s]: friction without any smoothing has no step that is short enough."""
 
-TIMES_BRAKING = 4.0
+TIMES_BRAKING = 3.0
 """Times as long as the time in which friction at its steepest brakes a joint that a step may be [-].
 
-Positions of a leg and of arms are then within 2e-5 rad of those with steps of a twentieth. Steps of ten times that time
-throw a joint back before it reverses: a first stage does not see how steep friction is about to become."""
-
+Positions of legs and of arms are then within 5e-5 rad of those with steps of a twentieth, most within 1e-5. Steps of 15
+times that time throw a joint back before it reverses: the first stage does not see how steep friction is going to be."""
 
 PLACES = 16
 """Configurations along the reference at which the inertia is looked at."""

@@ -73,9 +73,9 @@ def scores(pieces):
 
 def test_four_periods_are_off_by_no_more_than_they_say(pieces, monkeypatch):
     found = scores(pieces)
-    # of six recordings of one motion the mean is known to 0.4: what is left of the bias is about its own uncertainty
-    assert np.max(np.abs(found.mean(axis=0))) < 1.9
-    assert np.sqrt(np.mean(found**2)) < 1.7
+    # of six recordings of one motion the mean is known to 0.4: what is left of the bias is three times that
+    assert np.max(np.abs(found.mean(axis=0))) < 1.5
+    assert np.sqrt(np.mean(found**2)) < 1.5
     # the same recordings with all samples counted
     monkeypatch.setattr(weights, "FEWEST_PERIODS", PERIODS + 1)
-    assert np.max(np.abs(scores(pieces).mean(axis=0))) > 2.4
+    assert np.max(np.abs(scores(pieces).mean(axis=0))) > 1.8
