@@ -43,9 +43,9 @@ class FrictionLaw(ABC):
     def start(self, viscous: float, coulomb: float, position: float) -> JointFriction:
         """Friction of one joint side at rest at `position`; viscous [N m s/rad], Coulomb [N m]."""
 
-    @abstractmethod
     def steepest(self, coulomb: float) -> float:
-        """Largest slope of Coulomb friction [N m] over the speed [N m s/rad]."""
+        """Largest slope of Coulomb friction [N m] over the speed [N m s/rad], none by default."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,6 @@ class PreslidingCoulomb(FrictionLaw):
     def start(self, viscous: float, coulomb: float, position: float) -> JointFriction:
         """Friction with an unloaded contact."""
         return _PreslidingJoint(viscous, coulomb, self.deflection, position)
-
-    def steepest(self, coulomb: float) -> float:
-        """None: it depends on the position."""
-        return 0.0
 
 
 class _PreslidingJoint:
