@@ -97,11 +97,18 @@ def test_another_motion_is_compared_beside_its_reversals_too(sticking, laborator
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize("possible", [True, False])
-def test_a_start_of_sliding_that_a_search_did_not_see_is_no_friction_more(laboratory, monkeypatch, possible):
-    """Its speed was left so low that no sample is slower: no step leads back, and none may be possible beside it."""
+@pytest.mark.parametrize(("possible", "first"), [(True, True), (True, False), (False, True)])
+def test_a_start_of_sliding_that_a_search_did_not_see_is_no_friction_more(laboratory, monkeypatch, possible, first):
+    """Its speed was left so low that no sample is slower: no step leads back, and none may be possible beside it.
+
+    Whether the joint promises most or only comes out best.
+    """
     if not possible:
         monkeypatch.setattr(beside_reversals, "next_effect", lambda *_: None)
+    if not first:
+        monkeypatch.setattr(
+            beside_reversals, "scan", lambda *given: sorted(scan(*given), key=lambda c: c.effect.joint == "ankle")
+        )
     speed = 0.01
     recording = laboratory.record(periods=12, jitter=FrictionJitter(0.02, 0.05), friction=SmoothCoulomb(speed))
     low = make_effect("coulomb_friction", "ankle", smoothing=1e-4)
