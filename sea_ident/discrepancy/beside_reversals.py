@@ -25,6 +25,10 @@ from sea_ident.effects.stribeck_friction import StribeckFriction
 SPEEDS = 12
 """Speeds from which the start of a sliding friction is refined: each twice the one before."""
 
+MOST_OF_IT = 0.5
+"""Share of what is left beside reversals that a friction must explain: the corner that a speed within the band misses
+is left there too, at every joint, and some friction explains a part of it [-]."""
+
 USUAL = 1
 """Caution of the recordings that are looked at: one that is diagnosed without its slow samples is not."""
 
@@ -34,7 +38,8 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
 
     What the mean leaves there is not noise alone: the corner of friction that a band-limited speed misses, a motor that
     friction holds. So that must be more than chance as a whole, and an effect must explain a share of it as anywhere
-    else, stand out of the scatter of the periods along its own column, and be the best of the whole library. Stiction
+    else and most of what is left, stand out of the scatter of the periods along its own column, and be the best of the
+    whole library. Stiction
     is looked for in the passes first: where it lets go at another instant in each, the mean hardly shows it.
 
     Args:
@@ -71,6 +76,8 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
             break
         if other_start(step[0].effects[-1].joint):
             continue
+        if step[0].excess > (1.0 - MOST_OF_IT) * now.fit.excess:
+            break
         # all others only where one of the few may be it: mostly none is
         step = _next(near, now, before.start.fit, scan(near, now.fit, now.noise))
         if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:

@@ -175,3 +175,14 @@ def test_what_lets_a_motor_go_late_is_stiction_where_the_mean_shows_a_trace_of_i
     assert beside_reversals._let_go_late(near, start, 0) == (start, [])
     late.clear()
     assert beside_reversals._let_go_late(near, start, 1) == (start, [])
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("share", "seen"), [(0.5, [("stribeck_friction", "knee")]), (0.99, [])])
+def test_friction_explains_most_of_what_is_left_beside_reversals_or_is_none(sticking, monkeypatch, share, seen):
+    """The corner that a speed within the band misses is left there too, and some friction explains a part of it."""
+    bench, _ = sticking
+    monkeypatch.setattr(beside_reversals, "breakaway_p", lambda *_: 1.0)
+    monkeypatch.setattr(beside_reversals, "MOST_OF_IT", share)
+    _, confirmed = searched_beside_reversals(bench, unsearched(bench))
+    assert named(confirmed.selection) == seen
