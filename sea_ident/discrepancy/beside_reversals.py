@@ -39,8 +39,8 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     What the mean leaves there is not noise alone: the corner of friction that a band-limited speed misses, a motor that
     friction holds. So that must be more than chance as a whole, and an effect must explain a share of it as anywhere
     else and most of what is left, stand out of the scatter of the periods along its own column, and be the best of the
-    whole library. Stiction
-    is looked for in the passes first: where it lets go at another instant in each, the mean hardly shows it.
+    whole library. Stiction is looked for in the passes first: where it lets go at another instant in each, the mean
+    hardly shows it.
 
     Args:
         bench: the recording.

@@ -1,7 +1,7 @@
 """`diagnose`: where a model and a recording disagree, and which effect is missing."""
 
 import warnings as python_warnings
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 from sea_ident._typing import FloatArray
@@ -147,8 +147,8 @@ def diagnose(
     change, change_notes = _against(reference, as_identified, bench.data)
     tell("simulating", 0.85)
     fits = [(as_identified, selection.final.fit), *([(processed, selection.start.fit)] if selection.added else [])]
-    repaired, *before = side_by_side(lambda given: repaired_model(model, *given), fits)
-    forward = _forward(before, repaired, held, recording, processed, controller)
+    repaired, *others = side_by_side(lambda given: repaired_model(model, *given), fits)
+    forward = _forward(others[0] if others else None, repaired, held, recording, processed, controller)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
     said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *forward.notes)
@@ -337,7 +337,7 @@ def _against(
 
 
 def _forward(
-    before: Sequence[Model | None],
+    before: Model | None,
     repaired: Model | None,
     held: HeldOut | None,
     recording: Recording | ProcessedRecording,
@@ -345,12 +345,11 @@ def _forward(
     controller: Controller | None,
 ) -> SimulationGap:
     """Forward simulation before and after, on another motion where there is one; nothing where nothing was added."""
-    (first,) = before or (None,)
-    if first is None or repaired is None:
+    if before is None or repaired is None:
         return SimulationGap({}, ())
     if held is not None and held.processed is not None and held.recording is not None:
-        return simulation_gap(first, repaired, held.recording, held.processed, controller)
-    found = simulation_gap(first, repaired, recording, processed, controller)
+        return simulation_gap(before, repaired, held.recording, held.processed, controller)
+    found = simulation_gap(before, repaired, recording, processed, controller)
     same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
     return replace(found, notes=(*same, *found.notes))
 

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plants import baxter_arm, modest_series, ur10
+from plants import baxter_arm, from_parts, joint, link, modest_series, motor, ur10
 
+from sea_ident import FourierSeries
 from sea_ident.simulation import (
     FrictionJitter,
     PreslidingCoulomb,
@@ -47,6 +48,24 @@ def test_a_light_joint_with_much_friction_is_not_thrown_back_where_it_reverses(a
     assert np.abs(usual.motion.q - exact.motion.q).max() < 2e-5
     assert np.abs(usual.motion.dq - exact.motion.dq).max() < 2e-3
     assert np.abs(long.motion.dq - exact.motion.dq).max() > 5e-3
+
+
+def test_a_light_rotor_that_reverses_quickly_is_where_short_steps_put_it():
+    numbers = "<viscousFriction>0.4</viscousFriction><coulombFriction>1.0</coulombFriction>"
+    robot = from_parts(
+        link("base"), link("one"), joint("a", "base", "one", "0 1 0"),
+        motor("a", 'stiffness="300" damping="1.0"', numbers).replace("3e-5", "1e-5"),
+    )  # fmt: skip
+    series = FourierSeries(0.5, np.zeros(1), np.array([[0.0, 0.0, 0.3]]), np.array([[0.1, 0.0, 0.3]]))
+
+    def positions(step):
+        quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none()}
+        run = simulate(robot, series, periods=1, step=step, start=series.motion(np.zeros(1)), **quiet)
+        return run.step, run.motion.q, run.motion.theta
+
+    (usual, *found), (_, *exact) = positions(None), positions(6e-5)
+    assert usual < LONGEST
+    assert np.max(np.abs(np.subtract(found, exact))) < 5e-5
 
 
 def test_friction_of_geared_joints_with_springs_needs_no_much_shorter_step(leg, leg_series):
