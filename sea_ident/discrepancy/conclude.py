@@ -191,7 +191,9 @@ def unexplained(confirmed: Confirmed) -> bool:
 
 def beyond_the_library(confirmed: Confirmed, trends: TrendTest) -> bool:
     """Whether what was found leaves so much that, whatever of its equals it is called, the library does not have it."""
-    if not confirmed.selection.added or trends.trends or not unexplained(confirmed):
+    if not confirmed.selection.added or not unexplained(confirmed):
+        return False
+    if trends.may_leave(remainder_share(confirmed.bench, confirmed.final)):
         return False
     return confirmed.final.fit.excess > UNEXPLAINED_BY_FRICTION * max(confirmed.start.fit.excess, 1.0)
 
@@ -244,8 +246,7 @@ def verdict_of(
         if change is not None and change.changed:
             return Verdict.ONLY_AGAINST_REFERENCE
         return Verdict.NONE
-    # what drifts is in the mean too, where all that changes is known
-    drifts = bool(trends.trends) and not trends.unnamed
+    drifts = trends.may_leave(remainder)
     if not holds:
         return Verdict.SUSPECT
     if large and unexplained > UNEXPLAINED_BY_FRICTION and not drifts and bench.data.periods >= FEWEST_PERIODS:

@@ -25,7 +25,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference, identified_like
 from sea_ident.discrepancy.repair import repaired_model
@@ -190,13 +190,19 @@ def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _
     before = compare_periods(bench, start.fit, temperature)
     less = _less(bench, start.fit, before, temperature)
     found = _searched_mean(less, temperature, tell, start=start if less is bench else None)
-    if _names(found.trends) != _names(before):
+    if _names(found.trends) != _names(before) and not (less is bench and _lacks_more(found)):
         first = found.confirmed
         nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
         again = _less(bench, first.final.fit, found.trends, temperature)
         found = _searched_mean(again, temperature, tell, still_needed(again, first.selection) if nearly else None)
     bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
     return replace(found, bench=bench, confirmed=confirmed)
+
+
+def _lacks_more(found: _Found) -> bool:
+    """Whether so much is left that what drifts is not what kept the rest from being found."""
+    confirmed = found.confirmed
+    return unexplained(confirmed) and remainder_share(confirmed.bench, confirmed.final) > found.trends.torque_change
 
 
 def _searched_mean(
@@ -255,9 +261,13 @@ def _tested(
         ruled_out = {effect_key(confirmed.selection.effects[k]) for k in weak}
         other = None if searched else _searched_beside(bench, left, ruled_out)
         searched = True
-        selection, alternatives = _with_alternatives(bench, left if other is None else other.selection)
-        selection, alternatives, held = decide(bench, selection, alternatives, held.again(selection))
-        confirmed = (other or confirmed).less(selection)
+        confirmed = (other or confirmed).less(left if other is None else other.selection)
+        held, alternatives = held.again(confirmed.selection), {}
+        if not beyond_the_library(confirmed, trends):
+            selection, alternatives = _with_alternatives(bench, confirmed.selection)
+            held = held if selection is confirmed.selection else held.again(selection)
+            selection, alternatives, held = decide(bench, selection, alternatives, held)
+            confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     read_there = confirmed.selection.joints_of(SpringHysteresis) & (constant - slipping)
     told = tuple(words.told_by_the_other_motion(joint) for joint in sorted(read_there))
     return confirmed, alternatives, held, (*notes, *told)

@@ -113,6 +113,15 @@ class TrendTest:
     unnamed: bool
     notes: tuple[str, ...] = ()
 
+    @property
+    def torque_change(self) -> float:
+        """By how much all that is named changes the torque, as a share of it [-]: no more of it is in the mean."""
+        return sum(trend.torque_change for trend in self.trends)
+
+    def may_leave(self, remainder: float) -> bool:
+        """Whether it is known what drifts, and that may leave so much of the torque in the mean of the periods [-]."""
+        return bool(self.trends) and not self.unnamed and remainder <= self.torque_change
+
 
 def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = None) -> TrendTest:
     """Test the residuals of the periods for a trend, and name it.

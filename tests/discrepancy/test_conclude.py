@@ -5,7 +5,6 @@ The effect that the library lacks is planted from here and never registered.
 
 import warnings
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -13,21 +12,26 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import (
     _known_better,
     _locations,
     beyond_the_library,
     explains,
     predicts,
+    verdict_of,
     without_sizes,
 )
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
+from sea_ident.discrepancy.lack import remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
+from sea_ident.effects.friction_drift import FrictionDrift
 from sea_ident.exceptions import SeaIdentWarning
 
 PERIOD = 5.0
@@ -155,11 +159,30 @@ def test_it_is_no_matter_of_doubt_where_it_is_known_what_holds(rippled, joint, s
 def test_what_leaves_more_than_half_needs_no_choice_between_equals(rippled):
     bench, start, right = rippled
 
-    def beyond(final, added=1, drifts=()):
+    def beyond(final, added=1, change=None):
         found = Confirmed(Selection(start, final, added, ()), bench, start, final)
-        return beyond_the_library(found, SimpleNamespace(trends=drifts))
+        return beyond_the_library(found, drifting(change))
 
     assert beyond(start)
     assert not beyond(right)
     assert not beyond(start, added=0)
-    assert not beyond(start, drifts=("a drift",))
+    left = remainder_share(bench, start)
+    assert not beyond(start, change=1.1 * left)
+    assert beyond(start, change=0.9 * left), "what drifts leaves no more in the mean than it changes"
+
+
+@pytest.mark.parametrize(("change", "verdict"), [(0.06, Verdict.NAMED_WITH_REMAINDER), (0.006, Verdict.NOT_IN_LIBRARY)])
+def test_what_drifts_is_no_excuse_for_more_than_it_changes(rippled, change, verdict):
+    bench = rippled[0]
+    found = [MissingEffect("transmission_coupling", "hip", (), 0.06, 0.0, ())]
+    notes = Findings()
+    assert verdict_of(bench, found, drifting(change), None, 0.036, 0.05, notes) is verdict
+    assert verdict_of(bench, found, drifting(None), None, 0.036, 0.05, notes) is Verdict.NOT_IN_LIBRARY
+
+
+def drifting(change):
+    """A comparison of periods that found one drift with such a change of the torque, or none."""
+    effect = FrictionDrift("ankle")
+    none = np.zeros(2)
+    trends = () if change is None else (Trend(effect, none, none, 100.0, 1e-9, change),)
+    return TrendTest(1e-9, trends, False)
