@@ -32,7 +32,10 @@ SOFTER = (0.25, 0.5, 1.0, 1.4)
 """Softness of the ends of a play of which the best is a beginning too [-]: hard ends do not show how soft ones do."""
 
 IN_SERIES = 4
-"""Steps in which the width of such a play makes it one in series with its spring."""
+"""Steps in which the width of such a play makes it one in series with its spring, ..."""
+
+IN_ITS_SPRING = 0.05
+"""... and share of the stiffness of that to which it has the same, and need not be followed further [-]."""
 
 MOST_LAWS = 4
 """Rounds in which an effect in a spring follows the law of the spring, and the law the effect."""
@@ -176,19 +179,17 @@ def _as_wide_as_in_its_spring(bench: Bench, play: Backlash, fit: Fit) -> Backlas
         play: the play.
         fit: the model with it.
     """
-    deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(play.required_joint)]
-    stiffness = fit.parameters.get(f"{play.joint}.spring_stiffness", 0.0)
-    least, own = float(np.min(np.abs(deflection))), fit.parameters[play.parameter_name()]
-    if np.ptp(np.sign(deflection)) or not stiffness > 0.0 or not own > 0.0 or play.half_width > BEGINS * least:
+    least, ratio = _least_deflection(bench, fit, play), _over_its_spring(fit, play)
+    if not ratio > 0.0 or play.half_width > BEGINS * least:
         return play
-    return replace(play, half_width=min(play.half_width * own / stiffness, least / BEGINS))
+    return replace(play, half_width=min(play.half_width * ratio, least / BEGINS))
 
 
 def _open(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
-    """Play that is in no spring replaced by one that is, where the motion never closes that and it does as well.
+    """Play with hard ends in the stiffness of its spring, where the motion never closes that and it does as well.
 
     On such a motion it is a constant torque, whatever the width. Soft ends follow a little of what else is there, with
-    a stiffness that is not that of the spring.
+    a stiffness that is not that of the spring, and are not what another motion shows.
 
     Args:
         bench: the recording.
@@ -197,24 +198,37 @@ def _open(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
         position: of the play in it.
     """
     play = fit.effects[position]
-    if not isinstance(play, Backlash) or _in_series(fit, play):
+    if not isinstance(play, Backlash) or not _least_deflection(bench, fit, play):
         return fit
-    tried = replace(play, softness=NEARLY_HARD)
-    for _ in range(IN_SERIES):
-        effects = list(fit.effects)
-        effects[position] = tried
-        new = bench.fit(effects, noise, start=fit.parameters)
-        if _in_series(new, tried) and new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit:
-            return new
-        last, tried = tried, _as_wide_as_in_its_spring(bench, tried, new)
-        if tried == last:
-            break
-    return fit
+    if play.softness <= NEARLY_HARD and abs(_over_its_spring(fit, play) - 1.0) < IN_ITS_SPRING:
+        return fit
+    found, tried = fit, replace(play, softness=NEARLY_HARD)
+    # in the law of its spring as it was found first, then in that which it is with such a play
+    for follows in (False, True):
+        for _ in range(IN_SERIES):
+            effects = list(found.effects)
+            effects[position] = tried
+            new = bench.fit(effects, noise, start=found.parameters)
+            possible = tried.plausible(np.array([new.parameters[tried.parameter_name()]]), new.parameters)
+            if possible and new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit:
+                found = new
+            own = bench.anchored(new.effects, new.parameters)[position] if follows else tried
+            last, tried = tried, _as_wide_as_in_its_spring(bench, own, new) if isinstance(own, Backlash) else tried
+            if tried == last:
+                break
+    return found
 
 
-def _in_series(fit: Fit, play: Backlash) -> bool:
-    """Whether the stiffness of a play is about that of the spring that it is in."""
-    return play.plausible(np.array([fit.parameters[play.parameter_name()]]), fit.parameters)
+def _least_deflection(bench: Bench, fit: Fit, play: Backlash) -> float:
+    """The least deflection of the spring that a play is in, 0 where it deflects to both sides."""
+    deflection = bench.state(fit.effects).motion.deflection[:, bench.robot.index(play.required_joint)]
+    return 0.0 if np.ptp(np.sign(deflection)) else float(np.min(np.abs(deflection)))
+
+
+def _over_its_spring(fit: Fit, play: Backlash) -> float:
+    """Stiffness of a play over that of the spring that it is in, 0 where that has none [-]."""
+    stiffness = fit.parameters.get(f"{play.joint}.spring_stiffness", 0.0)
+    return fit.parameters[play.parameter_name()] / stiffness if stiffness > 0.0 else 0.0
 
 
 def _share(effect: SignalEffect, amount: Shape) -> float:

@@ -145,6 +145,30 @@ def test_play_in_no_spring_gives_way_to_play_that_is_never_closed(laboratory, no
     assert _open(bench, found, start.noise, len(start.fit.effects)) is found
 
 
+@pytest.mark.scenario
+def test_play_whose_ends_a_motion_leaves_open_is_hard_and_in_its_spring(laboratory, nothing_missing):
+    """Soft play of half the width, in a spring twice as stiff, is possible too, and wrong on any motion that passes."""
+    bench, _ = nothing_missing
+    deflection = bench.data.motion.deflection
+    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
+    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    spring = bench.robot.spring(name)
+    width, cubic = 0.6 * least, spring.cubic_stiffness / spring.stiffness
+    planted = ("backlash", name, [spring.stiffness], {"half_width": width, "cubic": cubic, "softness": 0.05})
+    bench = laboratory.bench(laboratory.record([planted], periods=6))
+    start = settle(bench, bench.effects)
+    soft = make_effect("backlash", name, half_width=0.45 * width, softness=1.0)
+    fit = bench.fit((*start.fit.effects, soft), start.noise, start=start.fit.parameters)
+    assert physical(bench, fit, -1)
+    assert fit.parameters[f"{name}.backlash"] > 1.8 * fit.parameters[f"{name}.spring_stiffness"]
+    found = _open(bench, fit, start.noise, len(start.fit.effects))
+    play = found.effects[-1]
+    assert play.half_width == pytest.approx(width, rel=0.02)
+    assert play.softness == 0.05
+    assert play.cubic == pytest.approx(found.parameters[f"{name}.spring_stiffening"] / spring.stiffness, rel=0.05)
+    assert _open(bench, found, start.noise, len(start.fit.effects)) is found
+
+
 def test_play_that_is_fitted_is_held_against_play_that_is_never_closed(rippled, monkeypatch):
     bench, start, _ = rippled
     asked = []
