@@ -13,8 +13,15 @@ from typing import Generic, TypeVar
 
 from joblib import cpu_count
 
+if sys.platform == "linux":
+    import fcntl
+
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+
+ROOM = 1 << 20
+"""Results that a second process may have sent before they are taken, all a Linux pipe holds [bytes]: one that is full
+would keep it from going on until this process has finished what it does."""
 
 LONGEST_WAIT = 60.0
 """Time after which what a second process has not answered is done here [s]: it may stand still for good, for it was
@@ -93,6 +100,8 @@ class _Copy(Generic[_Item, _Result]):
     def __init__(self, function: Callable[[_Item], _Result], items: Sequence[_Item]) -> None:
         context = multiprocessing.get_context("fork")
         self._receiver, sender = context.Pipe(duplex=False)
+        with suppress(OSError):  # more than this user may have
+            _widen(sender)
         self._count = len(items)
         self._begun = context.Value("i", 1)  # the first is for this process
         self._first = True
@@ -136,6 +145,12 @@ class _Copy(Generic[_Item, _Result]):
         self._process.join()
         self._process.close()
         _Copy.at_work -= 1
+
+
+def _widen(sender: Connection) -> None:
+    """Make room in the pipe for what is sent."""
+    if sys.platform == "linux":
+        fcntl.fcntl(sender.fileno(), fcntl.F_SETPIPE_SZ, ROOM)
 
 
 def _work(

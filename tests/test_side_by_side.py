@@ -73,6 +73,19 @@ def test_large_results_come_whole():
     assert [float(each.mean()) for each in found] == [0.0, 1.0, 2.0, 3.0]
 
 
+def test_the_copy_goes_on_while_its_results_wait_to_be_taken():
+    begun = multiprocessing.get_context("fork").Event()
+
+    def large(item):
+        if item == 0:
+            assert begun.wait(20.0), "the copy stood still with a result that nobody took yet"
+        if item == 2:
+            begun.set()
+        return np.full(60_000, item)
+
+    assert [float(each.mean()) for each in side_by_side(large, range(3))] == [0.0, 1.0, 2.0]
+
+
 def test_an_error_is_raised_in_its_turn():
     def odd(item):
         time.sleep(0.02)

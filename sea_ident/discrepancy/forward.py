@@ -219,10 +219,11 @@ def simulation_gap(
     notes = [command.note] if command.note else []
     parts = command.parts(processed)
     deviations = []
-    simulations = side_by_side(lambda model: [simulated(model, command, part) for part in parts], (before, after))
+    driven = [(model, part) for model in (before, after) for part in parts]
+    simulations = side_by_side(lambda one: simulated(one[0], command, one[1]), driven)
     for label in ("before", "after"):
         try:
-            runs = next(simulations)
+            runs = [next(simulations) for _ in parts]
         except SeaIdentError as error:
             notes.append(f"no forward simulation of the model {label} the repair: {error}")
             return SimulationGap({}, tuple(notes))
