@@ -11,7 +11,6 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action
 from sea_ident.effects.base import Anchor, Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
-from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
 LARGEST = 1.0
@@ -57,23 +56,18 @@ class BaseTilt(Effect):
     def evaluate(self, state: State) -> Contribution:
         """Torque of the change of gravity over the angle."""
         inertial = np.array(self.inertial) if len(self.inertial) else state.robot.inertial_parameters
-        still = np.zeros_like(state.motion.q)
-        motion = state.motion
-        held = Motion(motion.time, motion.q, still, still, motion.theta, still, still)
-        link, motor = [], []
         gravity = np.asarray(state.robot.model.gravity.linear)
         axes = level_axes(gravity)
         turn = self.angles[0] * axes[0] + self.angles[1] * axes[1]
         half = 0.5 * float(np.linalg.norm(turn))
         along, across = np.sinc(2.0 * half / np.pi), 0.5 * np.sinc(half / np.pi) ** 2
+        columns = []
         for axis in axes:
             sideways = np.cross(axis, gravity)
             change = along * sideways - across * np.cross(turn, sideways)
-            rows = State(with_gravity(state.robot, change), held).body_rows(inertial)
             # the base turns by an angle, so gravity turns the other way as the robot sees it
-            link.append(-rows.link)
-            motor.append(-rows.motor)
-        return Contribution(np.concatenate(link, axis=2), np.concatenate(motor, axis=2))
+            columns.append(-state.gravity_torque(change, inertial))
+        return state.body_columns(np.stack(columns, axis=2))
 
     def anchored(self, anchor: Anchor) -> "BaseTilt":
         """With the inertial parameters of the model, and the angles that it has by now."""

@@ -21,6 +21,9 @@ from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 from sea_ident.robot.rotor_columns import rotor_columns
 
+MOMENTS = 4
+"""Of the ten inertial parameters of a body, mass and first moments come first: they alone have a weight."""
+
 
 class Side(StrEnum):
     """Where an effect enters."""
@@ -77,12 +80,42 @@ class State:
     @cached_property
     def body_regressor(self) -> FloatArray:
         """(N, n, 10 b) link rows of the standard inertial parameters of the links; in motor rows they are not."""
-        robot, motion = self.robot, self.motion
-        model, data = robot.model, robot.model.createData()
+        return self._regressor(self.robot.model, self.motion.dq, self.motion.ddq)
+
+    def gravity_torque(self, gravity: FloatArray, inertial: FloatArray) -> FloatArray:
+        """(N, n) torque that the links at rest with these standard inertial parameters (10 b,) need [N m].
+
+        Args:
+            gravity: (3,) in the frame of the base [m/s2].
+            inertial: (10 b,).
+        """
+        out, moments = np.zeros_like(self.motion.q), np.reshape(inertial, (-1, 10))[:, :MOMENTS].ravel()
+        for axis in range(3):
+            if gravity[axis] != 0.0:
+                out += gravity[axis] * (self._rows_of_gravity(axis) @ moments)
+        return out
+
+    def _rows_of_gravity(self, axis: int) -> FloatArray:
+        """(N, n, 4 b) link rows of masses and first moments at rest, under gravity of 1 m/s2 along an axis."""
+        if axis not in self._gravity:
+            model, still = pin.Model(self.robot.model), np.zeros_like(self.motion.q)
+            model.gravity = pin.Motion(np.eye(3)[axis], np.zeros(3))
+            rows = self._regressor(model, still, still)
+            self._gravity[axis] = rows.reshape(*rows.shape[:2], -1, 10)[..., :MOMENTS].reshape(*rows.shape[:2], -1)
+        return self._gravity[axis]
+
+    @cached_property
+    def _gravity(self) -> dict[int, FloatArray]:
+        """`_rows_of_gravity` by axis, of those that were asked for."""
+        return {}
+
+    def _regressor(self, model: pin.Model, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+        """(N, n, 10 b) link rows at these speeds and accelerations of the links (N, n)."""
+        robot, motion, data = self.robot, self.motion, model.createData()
         rows = [robot.extended_model.joints[int(k)].idx_v for k in robot.body_indices]
         link_map = robot.link_map[rows]
         x = np.ascontiguousarray(motion.q @ link_map.T + robot.offset[rows])
-        v, a = np.ascontiguousarray(motion.dq @ link_map.T), np.ascontiguousarray(motion.ddq @ link_map.T)
+        v, a = np.ascontiguousarray(dq @ link_map.T), np.ascontiguousarray(ddq @ link_map.T)
         out = np.empty((len(motion), model.nv, 10 * (model.njoints - 1)))
         compute = pin.computeJointTorqueRegressor
         for k in range(len(motion)):

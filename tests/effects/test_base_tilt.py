@@ -13,8 +13,8 @@ from sea_ident.regressor import inverse_dynamics, model_columns, prior_parameter
 @pytest.mark.parametrize("angles", [(0.002, -0.001), (0.12, 0.0), (-0.2, 0.35)])
 def test_columns_times_angles_are_what_turned_gravity_does(name, angles):
     robot, generator = load_robot(name), np.random.default_rng(4)
-    q, still = generator.uniform(-1.0, 1.0, (20, robot.n)), np.zeros((20, robot.n))
-    motion = Motion(np.arange(20) / 100.0, q, still, still, q, still, still)
+    q, dq, ddq = generator.uniform(-1.0, 1.0, (3, 20, robot.n))
+    motion = Motion(np.arange(20) / 100.0, q, dq, ddq, q, dq, ddq)
     plain = make_effect("base_tilt")
     effects = (*base_effects(robot), *spring_effects(robot), plain)
     names = [column.name for column in model_columns(robot, effects)]
