@@ -29,7 +29,7 @@ NEARLY_ALL = 0.9
 drifts [-]."""
 
 RESOLVED = 0.5
-"""Share of the misfit that the repeated search may leave of what the first left there, where it leaves any [-]."""
+"""Share of the excess that the repeated search may leave of what the first left there, where it leaves any [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     found = search(far, bench.effects, _begun(far, confirmed, before))
     fit = found.final.fit
     explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
-    if not found.added or not (explained or fit.statistic / fit.dof < RESOLVED * first.statistic / first.dof):
+    if not found.added or not (explained or fit.excess < RESOLVED * first.excess):
         return None
     # with the usual samples freed: what a judge of the model would take out is just what must not be forgotten here
     usual = bench.comparing(away_from_reversals(bench.data))

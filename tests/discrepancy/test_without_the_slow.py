@@ -91,6 +91,28 @@ def test_no_search_begins_that_would_be_given_up(lingering, monkeypatch, added, 
     assert bool(begun) is begins
 
 
+@pytest.mark.scenario
+@pytest.mark.parametrize(("left", "taken"), [(0.4, True), (0.6, False)])
+def test_what_explains_most_of_what_is_left_is_taken(lingering, monkeypatch, left, taken):
+    """Beside noise: of twice the noise, what leaves 1.4 times it explains more than half of what is there."""
+    bench = Bench(lingering, (*base_effects(lingering.robot), *spring_effects(lingering.robot)))
+    start = settle(bench, bench.effects)
+
+    def leaving(excess):
+        fit = start.fit
+        size = np.sqrt((1.0 + excess) * fit.dof / fit.statistic)
+        return replace(start, fit=replace(fit, whitened=size * fit.whitened))
+
+    found = Selection(start, leaving(left), 1, (1e-9,))
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.settle_again", lambda far, fit: leaving(1.0))
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", lambda far, effects, begun=None: found)
+    monkeypatch.setattr(
+        "sea_ident.discrepancy.confirm.scan", lambda far, fit, noise: [SimpleNamespace(gain=0.9 * fit.excess)]
+    )
+    second = without_the_slow(bench, Confirmed(Selection(start, start, 0, ()), bench, start, start))
+    assert (second is not None) is taken
+
+
 @pytest.mark.slow
 def test_the_search_goes_on_from_what_explains_nearly_all(lingering, monkeypatch):
     """A large offset is plain with the slow samples too; only the ripple is looked for without them."""
