@@ -12,6 +12,7 @@ from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import explains, verdict_of
 from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, MissingParameter
+from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries
@@ -137,21 +138,15 @@ def test_every_verdict_follows_from_findings():
     class Bench:
         data = Data()
 
-    class Trends:
-        trends = ()
-        unnamed = False
-
     effect = MissingEffect("torque_ripple", "hip", (), 0.05, 1e-9, ())
     other = replace(effect, alternatives=(Alternative("torque_offset", "hip", 1.0),))
 
-    class Drifts(Trends):
-        trends = (object(),)
+    nothing = np.zeros(2)
+    drift = Trend(make_effect("friction_drift", "hip"), nothing, nothing, 100.0, 1e-9, torque_change=0.02)
+    steady, drifts, leaves_another = TrendTest(1.0, (), False), *(TrendTest(0.0, (drift,), u) for u in (False, True))
 
-    class LeavesAnother(Drifts):
-        unnamed = True
-
-    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True, trends=Trends):
-        return verdict_of(Bench(), missing, trends(), None, remainder, unexplained, Findings((), fatal), holds)
+    def verdict(missing, remainder=0.0, unexplained=0.0, fatal=False, holds=True, trends=steady):
+        return verdict_of(Bench(), missing, trends, None, remainder, unexplained, Findings((), fatal), holds)
 
     assert verdict([]) is Verdict.NONE
     assert verdict([effect]) is Verdict.NAMED
@@ -166,15 +161,15 @@ def test_every_verdict_follows_from_findings():
     assert verdict([effect], remainder=0.01, unexplained=0.3) is Verdict.NOT_IN_LIBRARY
     assert verdict([effect], remainder=0.01, unexplained=0.2) is Verdict.NAMED_WITH_REMAINDER
     # what drifts is in the mean too, but not where the periods show more than what was named
-    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.NAMED_WITH_REMAINDER
-    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=LeavesAnother) is Verdict.NOT_IN_LIBRARY
+    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=drifts) is Verdict.NAMED_WITH_REMAINDER
+    assert verdict([effect], remainder=0.01, unexplained=0.6, trends=leaves_another) is Verdict.NOT_IN_LIBRARY
     assert verdict([other]) is Verdict.AMBIGUOUS
     weak = replace(effect, transfer=0.1)
     assert verdict([weak]) is Verdict.SUSPECT
     # so much is left that the library does not have it, whether what is nearest holds on other data or not
     assert verdict([weak], remainder=0.01, unexplained=0.45) is Verdict.SUSPECT
     assert verdict([weak], remainder=0.01, unexplained=0.6) is Verdict.NOT_IN_LIBRARY
-    assert verdict([weak], remainder=0.01, unexplained=0.6, trends=Drifts) is Verdict.SUSPECT
+    assert verdict([weak], remainder=0.01, unexplained=0.6, trends=drifts) is Verdict.SUSPECT
     assert verdict([weak], remainder=0.01, unexplained=0.6, holds=False) is Verdict.SUSPECT
     # what else is missing may spoil one of several, but not one that is alone
     assert verdict([replace(effect, transfer=0.65)]) is Verdict.SUSPECT
