@@ -30,6 +30,9 @@ from sea_ident.discrepancy.judge import (
 from sea_ident.discrepancy.physics import is_term, possible
 from sea_ident.discrepancy.refit import of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Effect
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.side_by_side import side_by_side
 
 FAMILY_LEVEL = 1e-3
@@ -112,6 +115,7 @@ def next_effect(
     most, by_law, promised, explained = 0.0, 0.0, 0.0, False
     again = {effect_key(effect) for effect in fit.effects[len(bench.effects) :]}
     refits: list[tuple[Candidate, float]] = []
+    impossible: list[tuple[Effect, float]] = []
 
     def passed_over(candidate: Candidate) -> bool:
         """Whether it is not worth a refit beside what was accepted before it."""
@@ -135,6 +139,8 @@ def next_effect(
                 break
             outcome = next(outcomes)
             refits.append((candidate, outcome.gain if outcome.possible else 0.0))
+            if not outcome.possible:
+                impossible.append((candidate.effect, outcome.gain))
             if not outcome.acceptable or (is_push(candidate.effect) and not comes_first(outcome.gain, by_law, fit)):
                 continue
             new = bench.again(outcome.solution, noise)
@@ -155,7 +161,7 @@ def next_effect(
         whole = bench.refine(new.effects, noise, start=new.parameters) if len(accepted) > 1 else new
         return whole.statistic + unit * penalty(new.effects[-1], bench)
 
-    last = accepted[:LAST_TWO]
+    last = _where_it_rests(fit, accepted, impossible) or accepted[:LAST_TWO]
     scores = list(side_by_side(score, last))
     best, best_p = last[scores.index(min(scores))]
     own, whole_gain = effect_key(best.effects[-1]), fit.statistic - best.statistic
@@ -163,6 +169,29 @@ def next_effect(
         for candidate, gain in refits:
             tried[own, candidate.key] = Outdone(candidate.gain / whole_gain, gain / whole_gain)
     return best, best_p
+
+
+def _where_it_rests(
+    fit: Fit, accepted: Sequence[tuple[Fit, float]], impossible: Sequence[tuple[Effect, float]]
+) -> list[tuple[Fit, float]]:
+    """The constant of a spring, where dry friction in it would explain more than all others but is not possible alone.
+
+    It rests anywhere, and what slips nowhere stands in for that. Nothing else is in its way then: what explains a
+    little more than the constant does so by what the friction leaves.
+
+    Args:
+        fit: the model.
+        accepted: models with one effect more that are possible, and their significance.
+        impossible: effects that are not, and by how much they bring the statistic down.
+    """
+    most = max(fit.statistic - new.statistic for new, _ in accepted)
+    joints = {effect.joint for effect, gain in impossible if isinstance(effect, SpringHysteresis) and gain > most}
+    for new, p_value in accepted:
+        last = new.effects[-1]
+        if isinstance(last, SpringOffset) and last.joint in joints:
+            if fit.statistic - new.statistic > AS_MUCH * most:
+                return [(new, p_value)]
+    return []
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,6 +36,8 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
+from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.side_by_side import side_by_side
 
 LEAVES = 0.3
@@ -132,8 +134,8 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
     found = []
     for one, two in combinations(range(first, len(fit.effects)), 2):
         own, second = fit.effects[one], fit.effects[two]
-        if own.joint != second.joint:
-            continue
+        if own.joint != second.joint or {type(own), type(second)} == {SpringOffset, SpringHysteresis}:
+            continue  # a spring with dry friction in it rests anywhere: that is one cause, and takes two
         family: tuple[Effect, ...] = (*behind_the_spring(bench, own), *behind_the_spring(bench, second))
         if own.side is second.side:
             family = (*one_sided(own), *one_sided(second), *family)
