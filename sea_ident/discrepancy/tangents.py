@@ -244,7 +244,8 @@ class Tangents(Columns):
         At every sample that `_stride` leaves.
 
         The torque is linear in the inertial parameters. Where a body has a first moment without a mass, which is no
-        lever, a mass is put on every body and its own derivative taken off again.
+        lever, or a mass below zero, which several bodies together must not have, a mass is put on every body and its
+        own derivative taken off again.
         """
         robot = self.robot
         inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
@@ -254,7 +255,7 @@ class Tangents(Columns):
             return self._derivatives[2]
         bodies = inertial.reshape(-1, 10)
         moments = np.linalg.norm(bodies[:, 1:4], axis=1)
-        if np.all(rotors > 0.0) and np.all(np.abs(bodies[:, 0]) > moments / LONGEST_LEVER):
+        if np.all(rotors > 0.0) and np.all(bodies[:, 0] > moments / LONGEST_LEVER):
             models = [robot.with_inertial_parameters(inertial, rotors)]
         else:
             unit = np.zeros_like(inertial)

@@ -212,6 +212,18 @@ def test_bodies_without_mass_and_rotors_without_inertia(nothing_missing, less):
     np.testing.assert_allclose(rest + own, whole, atol=1e-10 * np.abs(whole).max())
 
 
+def test_bodies_that_have_together_less_than_no_mass(nothing_missing):
+    """A fit of what lacks much may say so; the torque is linear in a mass all the same."""
+    bench, now = nothing_missing
+    robot, parameters = bench.robot, now.fit.parameters
+    name = robot.inertial_names[10]
+    waves = (make_effect("encoder_eccentricity", "knee", sine=size, cosine=size) for size in (-1e-4, 1e-4))
+    ends = [corrected_motion(robot, (wave,), bench.data.motion) for wave in waves]
+    known = ({name: 1.0}, parameters, {**parameters, name: parameters[name] - 100.0})
+    of_one, whole, without = (bench._bodies_tangent(bench.state(()), *ends, each) for each in known)
+    np.testing.assert_allclose(without, whole - 100.0 * of_one, atol=1e-10 * np.abs(100.0 * of_one).max())
+
+
 def test_a_motion_without_torques_has_residuals_of_no_scale(nothing_missing):
     bench, now = nothing_missing
     data = replace(bench.data, tau_motor=np.zeros_like(bench.data.tau_motor))
