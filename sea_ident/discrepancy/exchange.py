@@ -132,7 +132,8 @@ class _Challenge:
             beat = better - fit.unit * penalty(candidate.effect, bench)
             new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
             ended, slack = new.effects[position], len(bench.slack_links(new)) > len(bench.slack_links(fit))
-            possible = not (slack or at_a_bound(ended) or too_short(bench, ended)) and physical(bench, new, position)
+            ends = at_a_bound(ended) or slowest(ended) or too_short(bench, ended)
+            possible = not (slack or ends) and physical(bench, new, position)
             gain = reduced.statistic - new.statistic if possible else 0.0
             tried[own, candidate.key] = Outdone(promised, gain / explained)
             if is_push(candidate.effect) and not lawless:

@@ -187,10 +187,9 @@ def _where_it_rests(
     most = max(fit.statistic - new.statistic for new, _ in accepted)
     joints = {effect.joint for effect, gain in impossible if isinstance(effect, SpringHysteresis) and gain > most}
     for new, p_value in accepted:
-        last = new.effects[-1]
-        if isinstance(last, SpringOffset) and last.joint in joints:
-            if fit.statistic - new.statistic > AS_MUCH * most:
-                return [(new, p_value)]
+        last, as_much = new.effects[-1], fit.statistic - new.statistic > AS_MUCH * most
+        if as_much and isinstance(last, SpringOffset) and last.joint in joints:
+            return [(new, p_value)]
     return []
 
 

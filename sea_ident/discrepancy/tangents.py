@@ -18,6 +18,7 @@ from sea_ident.effects import Column, Contribution, Effect, JointEffect, Shape, 
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
+from sea_ident.robot.model import LONGEST_LEVER
 
 SAMPLES_PER_HARMONIC = 4
 """Samples of the derivatives of the dynamics for every harmonic that is compared: what folds back into these is three
@@ -25,9 +26,6 @@ times as high, where a motion has next to nothing [-]."""
 
 SIGNALS_KEPT = 12
 """Errors of the encoders of which the deflections are kept."""
-
-LONGEST_LEVER = 10.0
-"""Distance of a centre of mass from its joint up to which it is as good as any to compute with [m]."""
 
 
 class Tangents(Columns):
@@ -243,12 +241,11 @@ class Tangents(Columns):
 
         At every sample that `_stride` leaves.
 
-        The torque is linear in the inertial parameters. Where a body has a first moment without a mass, which is no
-        lever, or a mass below zero, which several bodies together must not have, a mass is put on every body and its
-        own derivative taken off again.
+        The torque is linear in the inertial parameters. Where a body that slides has a first moment without a mass,
+        which is no lever, or a rotor has no inertia, more is put on every body and its own derivative taken off again.
         """
         robot = self.robot
-        inertial = np.array([parameters.get(name, 0.0) for name in robot.inertial_names])
+        inertial = robot.of_positive_mass(np.array([parameters.get(name, 0.0) for name in robot.inertial_names]))
         rotors = np.array([parameters.get(f"{rotor.rotor_group}.rotor_inertia", 0.0) for rotor in robot.rotors])
         key = tuple(inertial), tuple(rotors)
         if self._derivatives is not None and self._derivatives[0] is state and self._derivatives[1] == key:

@@ -15,6 +15,12 @@ from sea_ident.robot.limits import Limits
 INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 INERTIAL_UNITS = ("kg", "kg m", "kg m", "kg m") + ("kg m2",) * 6
 
+LONGEST_LEVER = 10.0
+"""Distance of a centre of mass from its joint up to which it is as good as any to compute with [m]."""
+
+SPARE_MASS = 1.0
+"""Mass that a body without any is given [kg]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Joint:
@@ -177,6 +183,30 @@ class Robot:
         """(rotors,) inertia of each rotor at its shaft, 0 where no prior is given [kg m2]."""
         inertias = self.extended_model.inertias
         return np.array([inertias[int(i)].inertia[2, 2] for i in self.rotor_indices])
+
+    def of_positive_mass(self, inertial: FloatArray) -> FloatArray:
+        """(10 b,) inertial parameters with which the robot needs the same torques, no turning body without a mass.
+
+        A mass on the axis of a joint may be a part of either body. Pinocchio divides by the mass of bodies together,
+        of which an estimate that is free may have less than none.
+
+        Args:
+            inertial: (10 b,) standard inertial parameters in the order of `inertial_names`.
+        """
+        model, out = self.extended_model, np.array(inertial, dtype=np.float64).reshape(-1, 10)
+        bodies = {int(index): k for k, index in enumerate(self.body_indices)}
+        for index in sorted(bodies, reverse=True):  # a parent comes before its children
+            own = out[bodies[index]]
+            moment = float(np.linalg.norm(own[1:4]))
+            if own[0] * LONGEST_LEVER > moment or not model.joints[index].shortname().startswith("JointModelR"):
+                continue
+            added = max(SPARE_MASS, moment) - own[0]
+            own[0] += added
+            parent = int(model.parents[index])
+            if parent in bodies:
+                at = pin.Inertia(1.0, model.jointPlacements[index].translation, np.zeros((3, 3)))
+                out[bodies[parent]] -= added * at.toDynamicParameters()
+        return out.ravel()
 
     def with_inertial_parameters(self, inertial: FloatArray, rotor_inertias: FloatArray) -> "Robot":
         """The same robot with other inertial parameters.

@@ -117,6 +117,7 @@ def plant_from_model(robot: Robot, effects: Sequence[Effect], parameters: FloatA
                 friction[i] = SmoothCoulomb(effect.shape_values["smoothing"])
         else:
             others.append(PlantedEffect(effect, values))
+    inertial = robot.of_positive_mass(inertial)
     for k, body in enumerate(robot.bodies):
         mass, moments = inertial[10 * k], inertial[10 * k + 1 : 10 * k + 4]
         if mass == 0.0 and np.any(moments != 0.0):

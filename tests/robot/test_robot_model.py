@@ -262,3 +262,31 @@ def test_massless_frame_between_two_joints_is_a_note() -> None:
     robot = build(*parts)
     assert any("zero mass: upper" in text for text in robot.warnings)
     assert robot.n == 2
+
+
+@pytest.mark.parametrize("name", ["exo_leg", "exo_leg_abduction", "hebi_x5"])
+def test_masses_on_the_axes_of_joints_may_be_a_part_of_either_body(name: str) -> None:
+    """Pinocchio divides by the mass of bodies together: an estimate may say that they have less than none."""
+    robot, generator = load_robot(name), np.random.default_rng(8)
+    inertial = robot.inertial_parameters
+    inertial[::10] = generator.uniform(-20.0, 1.0, len(robot.bodies))
+    there = robot.of_positive_mass(inertial)
+    bodies = there.reshape(-1, 10)
+    assert np.all(bodies[:, 0] > 0.0)
+    same, changed = (robot.with_inertial_parameters(each, robot.rotor_inertias()) for each in (inertial, there))
+    q, dq, ddq = generator.uniform(-1.0, 1.0, (3, 10, robot.n))
+    motion = Motion(np.arange(10) / 100.0, q, dq, ddq, q, dq, ddq)
+    expected, found = (np.stack(inverse_dynamics(each, motion)) for each in (same, changed))
+    np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_array_equal(robot.of_positive_mass(robot.inertial_parameters), robot.inertial_parameters)
+    # the mass matrix is the slope of those torques over the accelerations
+    x = changed.extended_state(q)[0]
+    data = changed.extended_model.createData()
+    mass = np.array(pin.crba(changed.extended_model, data, x))
+    mass = np.triu(mass) + np.triu(mass, 1).T
+    still = np.zeros_like(x)
+    weight = pin.rnea(same.extended_model, same.extended_model.createData(), x, still, still)
+    rows = [
+        pin.rnea(same.extended_model, same.extended_model.createData(), x, still, e) - weight for e in np.eye(len(x))
+    ]
+    np.testing.assert_allclose(mass, np.array(rows), atol=1e-9 * np.abs(mass).max())
