@@ -1,6 +1,7 @@
 """Which candidate is added next, and what it must come to."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,14 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import own_torque, torque_change
-from sea_ident.discrepancy.next_effect import CANCELLED, LARGE_TORQUE, _acceptable, least_useful, next_effect
+from sea_ident.discrepancy.next_effect import (
+    CANCELLED,
+    LARGE_TORQUE,
+    _acceptable,
+    _where_it_rests,
+    least_useful,
+    next_effect,
+)
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
@@ -151,3 +159,25 @@ def test_a_term_of_the_law_of_a_spring_may_be_cancelled_by_others_of_it(laborato
         assert own_torque(bench, large, -1) > LARGE_TORQUE
         assert torque_change(bench, start.fit, large) < CANCELLED * own_torque(bench, large, -1)
         assert _acceptable(bench, start.fit, large, quiet, np.zeros(len(bench.data.equations))) is accepted
+
+
+@pytest.mark.parametrize(
+    ("friction", "joint", "gain", "constant", "first"),
+    [
+        ("spring_hysteresis", "knee", 900.0, 665.0, True),
+        ("spring_hysteresis", "hip", 900.0, 665.0, False),
+        # what is possible explains more, or much more than the constant, or it is no dry friction
+        ("spring_hysteresis", "knee", 600.0, 665.0, False),
+        ("spring_hysteresis", "knee", 900.0, 500.0, False),
+        ("presliding_friction", "knee", 900.0, 665.0, False),
+    ],
+)
+def test_where_dry_friction_in_a_spring_rests_comes_before_it(friction, joint, gain, constant, first):
+    def leaving(name, explained):
+        return SimpleNamespace(statistic=1000.0 - explained, effects=(make_effect(name, "knee"),)), 1e-9
+
+    fit = SimpleNamespace(statistic=1000.0)
+    accepted = [leaving("encoder_eccentricity", 669.0), leaving("spring_offset", constant)]
+    found = _where_it_rests(fit, accepted, [(make_effect(friction, joint), gain)])
+    assert found == (accepted[1:] if first else [])
+    assert _where_it_rests(fit, accepted, []) == []
