@@ -59,6 +59,14 @@ def test_the_right_one_takes_the_place_of_the_wrong_one(wrong, tries):
     assert not outdone & set(tries)
 
 
+def test_a_wave_that_only_stands_in_for_a_constant_takes_no_place(wrong, monkeypatch):
+    monkeypatch.setattr(module, "slowest", lambda effect: effect.name == "torque_ripple")
+    tried = {}
+    after = exchange(*wrong, 1, tried)
+    assert effect_key(after.fit.effects[-1]) != key("torque_ripple")
+    assert tried[effect_key(wrong[1].fit.effects[-1]), key("torque_ripple")].explained == 0.0
+
+
 def test_what_promises_more_than_it_did_is_tried_again(wrong, tries):
     bench, now = wrong
     own = effect_key(now.fit.effects[-1])
