@@ -71,14 +71,19 @@ def test_beginnings_that_are_worse_than_the_estimate_are_not_followed(rippled, s
     assert max(steps) < 3.0 * right.fit.statistic
 
 
+def bent_to_one_side(bench):
+    """A joint whose spring a motion bends to one side only, and by how much at least."""
+    deflection = bench.data.motion.deflection
+    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
+    assert not np.ptp(np.sign(deflection[:, joint]))
+    return bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+
+
 @pytest.mark.scenario
 def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(laboratory, nothing_missing):
     """Its torque is K times the width: where a fit of both passes on, no K of another spring may come of it."""
     bench, _ = nothing_missing
-    deflection = bench.data.motion.deflection
-    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
-    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
-    assert not np.ptp(np.sign(deflection[:, joint]))
+    name, least = bent_to_one_side(bench)
     spring = bench.robot.spring(name)
     width, cubic = 0.4 * least, spring.cubic_stiffness / spring.stiffness
     planted = ("backlash", name, [spring.stiffness], {"half_width": width, "cubic": cubic})
@@ -94,9 +99,7 @@ def test_play_that_is_never_closed_is_as_wide_as_its_torque_in_this_spring(labor
 def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing):
     """Where the motion does not pass the play its softness is all that tells it from a constant."""
     bench, _ = nothing_missing
-    deflection = bench.data.motion.deflection
-    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
-    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    name, least = bent_to_one_side(bench)
     spring = bench.robot.spring(name)
     shapes = {"half_width": 0.8 * least, "softness": 0.8, "cubic": spring.cubic_stiffness / spring.stiffness}
     bench = laboratory.bench(laboratory.record([("backlash", name, [spring.stiffness], shapes)], periods=6))
@@ -123,9 +126,7 @@ def test_soft_ends_of_play_are_found_from_hard_ones(laboratory, nothing_missing)
 def test_play_in_no_spring_gives_way_to_play_that_is_never_closed(laboratory, nothing_missing):
     """Narrow play in a spring of its own is the same constant, and cannot be."""
     bench, _ = nothing_missing
-    deflection = bench.data.motion.deflection
-    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
-    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    name, least = bent_to_one_side(bench)
     width, stiffness = 0.3 * least, bench.robot.spring(name).stiffness
     bench = laboratory.bench(laboratory.record([("spring_offset", name, [-stiffness * width], {})], periods=6))
     start = settle(bench, bench.effects)
@@ -149,9 +150,7 @@ def test_play_in_no_spring_gives_way_to_play_that_is_never_closed(laboratory, no
 def test_play_whose_ends_a_motion_leaves_open_is_hard_and_in_its_spring(laboratory, nothing_missing):
     """Soft play of half the width, in a spring twice as stiff, is possible too, and wrong on any motion that passes."""
     bench, _ = nothing_missing
-    deflection = bench.data.motion.deflection
-    joint = int(np.argmin(np.ptp(np.sign(deflection), axis=0)))
-    name, least = bench.robot.joint_names[joint], float(np.abs(deflection[:, joint]).min())
+    name, least = bent_to_one_side(bench)
     spring = bench.robot.spring(name)
     width, cubic = 0.6 * least, spring.cubic_stiffness / spring.stiffness
     planted = ("backlash", name, [spring.stiffness], {"half_width": width, "cubic": cubic, "softness": 0.05})
