@@ -284,9 +284,7 @@ def test_masses_on_the_axes_of_joints_may_be_a_part_of_either_body(name: str) ->
     data = changed.extended_model.createData()
     mass = np.array(pin.crba(changed.extended_model, data, x))
     mass = np.triu(mass) + np.triu(mass, 1).T
-    still = np.zeros_like(x)
-    weight = pin.rnea(same.extended_model, same.extended_model.createData(), x, still, still)
-    rows = [
-        pin.rnea(same.extended_model, same.extended_model.createData(), x, still, e) - weight for e in np.eye(len(x))
-    ]
+    still, plain = np.zeros_like(x), same.extended_model
+    weight = np.array(pin.rnea(plain, plain.createData(), x, still, still))
+    rows = [pin.rnea(plain, plain.createData(), x, still, each) - weight for each in np.eye(len(x))]
     np.testing.assert_allclose(mass, np.array(rows), atol=1e-9 * np.abs(mass).max())

@@ -1,4 +1,5 @@
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sea_ident import SeaIdentError
@@ -16,6 +17,21 @@ def test_model_with_the_values_of_the_description_is_the_description(leg, leg_se
     np.testing.assert_allclose(
         run.recording.columns["current_hip"], exact.recording.columns["current_hip"][: len(run.motion)], atol=1e-9
     )
+
+
+def test_a_body_of_less_than_no_mass_moves_as_one_whose_joint_holds_the_rest(leg, leg_series, quiet, exact):
+    """An estimate may put mass on the axis of a joint into either body: shank and foot together have less than none."""
+    effects = (*base_effects(leg), *spring_effects(leg))
+    inertial = leg.inertial_parameters.reshape(-1, 10)
+    knee = leg.extended_model.jointPlacements[int(leg.body_indices[1])].translation
+    inertial[1, 0] -= 20.0
+    inertial[0] += 20.0 * pin.Inertia(1.0, knee, np.zeros((3, 3))).toDynamicParameters()
+    values = plant_from_robot(leg).values_of(effects)
+    names = [column.name for effect in effects for column in effect.columns(leg)]
+    values[[names.index(name) for name in leg.inertial_names]] = inertial.ravel()
+    model = plant_from_model(leg, effects, values)
+    run = simulate(leg, leg_series, periods=1, plant=model.plant, **{**quiet, "friction": model.friction})
+    np.testing.assert_allclose(run.motion.q, exact.motion.q[: len(run.motion)], atol=1e-9)
 
 
 def test_what_is_no_number_of_a_plant_is_planted(leg):
