@@ -3,6 +3,7 @@
 The effect that the library lacks is planted from here and never registered.
 """
 
+import sys
 import warnings
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -35,6 +36,7 @@ from sea_ident.effects.friction_drift import FrictionDrift
 from sea_ident.exceptions import SeaIdentWarning
 
 PERIOD = 5.0
+diagnosing = sys.modules["sea_ident.discrepancy.diagnose"]  # the function has the name of its module
 RIPPLE = ("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})
 
 
@@ -178,6 +180,24 @@ def test_what_drifts_is_no_excuse_for_more_than_it_changes(rippled, change, verd
     notes = Findings()
     assert verdict_of(bench, found, drifting(change), None, 0.036, 0.05, notes) is verdict
     assert verdict_of(bench, found, drifting(None), None, 0.036, 0.05, notes) is Verdict.NOT_IN_LIBRARY
+
+
+@pytest.mark.parametrize(("change", "searches"), [(0.9, 1), (1.1, 2)])
+def test_a_search_is_repeated_only_for_what_drifts_enough(rippled, monkeypatch, change, searches):
+    bench, start, _ = rippled
+    found = Confirmed(Selection(start, start, 0, ()), bench, start, start)
+    trends, calls = drifting(change * remainder_share(bench, start)), []
+
+    def searched(bench, *rest, **options):
+        calls.append(bench)
+        return diagnosing._Found(bench, found, trends)
+
+    monkeypatch.setattr(diagnosing, "compare_periods", lambda *rest: drifting(None))
+    monkeypatch.setattr(diagnosing, "_searched_mean", searched)
+    monkeypatch.setattr(diagnosing, "_less", lambda bench, *rest: bench)
+    monkeypatch.setattr(diagnosing, "searched_beside_reversals", lambda *both: both)
+    diagnosing._searched(bench, None, lambda what, share: None)
+    assert len(calls) == searches
 
 
 def drifting(change):
