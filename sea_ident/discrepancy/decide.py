@@ -7,6 +7,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
+from sea_ident.discrepancy.edges import at_centre
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import SHAPES_THAT_STAY, free_shapes, is_signal, moved
@@ -107,16 +108,19 @@ def decide(
     """
     kept: Alternatives = {}
     first = len(selection.final.fit.effects) - selection.added
-    changed = False
+    changed = reshaped = False
     for position, others in alternatives.items():
+        beside_another = changed or reshaped
         if not changed:
-            selection, held = _with_its_best_shape(bench, selection, held, position)
+            shaped, held = _with_its_best_shape(bench, selection, held, position)
+            selection, reshaped = shaped, reshaped or shaped is not selection
         own = held.transfers[position - first]
         left: list[Alternative] = []
         memory = remembering(bench, selection, held, position)
         waiting = list(others if memory is None else (*others, memory))
         while waiting:
-            comparison, compared = _Comparison(bench, selection, held, position, own, changed), list(waiting)
+            comparison = _Comparison(bench, selection, held, position, own, beside_another or changed)
+            compared = list(waiting)
             for other, rival in zip(compared, side_by_side(comparison, compared), strict=True):
                 waiting.pop(0)
                 fit = comparison.fit(other)
@@ -213,6 +217,8 @@ def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, posi
     best = held.transfers[position - len(fit.effects) + selection.added]
     if best.excess < EQUALLY_GOOD * best.unit:
         return selection, held
+    if isinstance(fit.effects[position], ExternalForce):
+        return _on_the_centre(bench, selection, held, position)
     shapes, chosen = _OpenShapes(bench, selection, held, position, fit, best), selection
     for ways in side_by_side(shapes, _other_shapes(bench, fit, position)):
         for solution, result in ways:
@@ -220,6 +226,21 @@ def _with_its_best_shape(bench: Bench, selection: Selection, held: HeldOut, posi
                 best = result
                 chosen = replace(selection, final=Settled(shapes.again(solution), selection.final.noise))
     return chosen, held if chosen is selection else held.again(chosen)
+
+
+def _on_the_centre(bench: Bench, selection: Selection, held: HeldOut, position: int) -> tuple[Selection, HeldOut]:
+    """A selection with a push on the centre of mass of its link, where both motions together speak for that.
+
+    Where a push meets its link bends to whatever else is missing beside it, far beyond what noise would do.
+    """
+    fit, noise = selection.final.fit, selection.final.noise
+    centre = at_centre(bench, fit, noise, position)
+    if centre is fit:
+        return selection, held
+    other = replace(selection, final=Settled(centre, noise))
+    own = held.transfers[position - len(fit.effects) + selection.added]
+    better = _better(held.worth(other, position, own), own, max(centre.statistic - fit.statistic, 0.0))
+    return (other, held.again(other)) if better else (selection, held)
 
 
 class _OpenShapes:

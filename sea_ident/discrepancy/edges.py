@@ -36,8 +36,11 @@ MOST_MOVES = 4
 """Times that edges are moved where the best of those within reach is the last of them."""
 
 FAR_ABOVE = 4.0
-"""Times the statistic of interest from which on, its edges known to the sample and its point as good as it gets, finer
-edges do not make a push the better one."""
+"""Times the statistic of interest from which on, its edges known to a part of a sample and its point as good as it
+gets, finer edges do not make a push the better one."""
+
+COARSE_STEP = 1.0 / 4.0
+"""That part: what a large push leaves by edges that are half a sample off is far above all noise."""
 
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
@@ -76,6 +79,8 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
         # a large push leaves much by edges that are a little off, so a window says little of what it may come to
         fit = _sharpened(bench, fit, noise, position, float(stride), 1.0)
     if fit.statistic > FAR_ABOVE * beat:
+        fit = _sharpened(bench, fit, noise, position, 2.0 * COARSE_STEP, COARSE_STEP)
+    if fit.statistic > FAR_ABOVE * beat:
         # and a link may be pushed far from its centre of mass
         fit = _moved_point(bench, fit, noise, position, FAR_ABOVE * beat)
         if fit.statistic > FAR_ABOVE * beat:
@@ -91,13 +96,24 @@ def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
     return fit
 
 
+def at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A fit with a push on the centre of mass of its link; the same where it is one."""
+    push = fit.effects[position]
+    at_centre = replace(push, **dict.fromkeys(POINT, 0.0))  # type: ignore[arg-type]
+    if at_centre == push:
+        return fit
+    effects = [at_centre if k == position else effect for k, effect in enumerate(fit.effects)]
+    centre = bench.fit(effects, noise, start=fit.parameters, tangents=False)
+    return _sharpened(bench, centre, noise, position, 1.0, FINEST_STEP)
+
+
 def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
     """A fit with the point of a push refined, and its edges once more, for these are held where it was wrong.
 
     A point that is not worth the price of its coordinates stays the centre of mass: one on a link farther out, near the
     axis of its joint, would do the same as a push on this one.
     """
-    centre = _at_centre(bench, fit, noise, position)
+    centre = at_centre(bench, fit, noise, position)
     for _ in range(POINT_ROUNDS):
         before = fit.statistic
         fit = _moved_point(bench, fit, noise, position)
@@ -108,17 +124,6 @@ def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit
     if centre.statistic < fit.statistic + price * fit.unit:
         fit = centre
     return bench.fit(fit.effects, noise, start=fit.parameters)
-
-
-def _at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
-    """A fit with a push on the centre of mass of its link."""
-    push = fit.effects[position]
-    at_centre = replace(push, **dict.fromkeys(POINT, 0.0))  # type: ignore[arg-type]
-    if at_centre == push:
-        return fit
-    effects = [at_centre if k == position else effect for k, effect in enumerate(fit.effects)]
-    centre = bench.fit(effects, noise, start=fit.parameters, tangents=False)
-    return _sharpened(bench, centre, noise, position, 1.0, FINEST_STEP)
 
 
 def _moved_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat: float = np.inf) -> Fit:
