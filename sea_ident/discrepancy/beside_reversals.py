@@ -95,6 +95,26 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
     return near, Confirmed(selection, near, start, now, beside=(near, now))
 
 
+def friction_of_the_slow(bench: Bench, confirmed: Confirmed) -> tuple[Bench, Confirmed] | None:
+    """What was found without the slow samples, with the friction that only these show.
+
+    What hides an effect among them may be such a friction as well as the steepness of friction there.
+
+    Args:
+        bench: the recording with the usual samples compared.
+        confirmed: what was found without those that are slow, and explains the rest.
+
+    Returns:
+        The bench that shows the friction, and what was found with it; None where that does not explain all there is.
+    """
+    found = confirmed.selection
+    now, start = (settle_again(bench, each.fit) for each in (found.final, found.start))
+    near, more = searched_beside_reversals(bench, replace(confirmed, selection=replace(found, start=start, final=now)))
+    if more.selection.added == found.added or lack_of_fit(near, more.final)[2] < LACK_LEVEL:
+        return None
+    return near, more
+
+
 def _let_go_late(near: Bench, now: Settled, most: int) -> tuple[Settled, list[float]]:
     """A model with the stiction that passes show where their motors are let go, and its significance.
 

@@ -9,7 +9,7 @@ from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
+from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
 from sea_ident.discrepancy.breakaway import stiction
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.circular import circular_springs
@@ -218,7 +218,9 @@ def _searched_mean(
         tell("searching without what is slow", 0.35)
         second = without_the_slow(bench, confirmed)
         if second is not None:
-            bench, confirmed, notes = second.bench, second, (words.slow_samples(second.bench.data),)
+            with_them = friction_of_the_slow(bench, second)
+            bench, confirmed = with_them or (second.bench, second)
+            notes = () if with_them else (words.slow_samples(bench.data),)
     tell("comparing the periods", 0.5)
     return _compared(bench, confirmed, temperature, notes)
 

@@ -28,7 +28,8 @@ CONFIRMED = 0.99
 """Share of what a constant could explain on another motion from which on it is the same there [-]: to a tenth of it."""
 
 MOST_OF_IT = 0.5
-"""Share of what is left there that such an element must explain where the constant is the same [-]."""
+"""Share that such an element must explain of what the constant fails to explain there, or of all that is left there
+where the constant is the same [-]."""
 
 STICKS = (0.5, 0.75, 1.0, 1.5, 2.0)
 """Deflections from which on an element does not slip to and fro, as shares of the travel of its spring [-]."""
@@ -81,7 +82,9 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
         return held.worth(replace(selection, final=Settled(fit, selection.final.noise)), position, found).excess
 
     best = min(zip(side_by_side(left, fits), range(len(fits)), strict=True), default=None)
-    if best is None or best[0] > found.excess * (MOST_OF_IT if found.share > CONFIRMED else 1.0):
+    # what else is missing there bends the constant as well
+    failed = found.excess if found.share > CONFIRMED else min((1.0 - found.share) * found.possible, found.excess)
+    if best is None or found.excess - best[0] < MOST_OF_IT * failed:
         return None
     return Alternative(SpringHysteresis.name, effect.joint, 1.0, fits[best[1]], dearer=True)
 
