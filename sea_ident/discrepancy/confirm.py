@@ -113,7 +113,8 @@ def _begun(far: Bench, confirmed: Confirmed, before: Settled) -> Selection | Non
         more = settle_again(far, whole.final.fit)
         if more.fit.excess < (1.0 - NEARLY_ALL) * there.fit.excess:
             found, there = whole, more
-    return found if explains_nearly_all(far, confirmed.start.fit, there) else None
+    # among other samples another effect may do better after all
+    return replace(found, tried={}) if explains_nearly_all(far, confirmed.start.fit, there) else None
 
 
 def explains_nearly_all(bench: Bench, start: Fit, final: Settled) -> bool:

@@ -1,7 +1,7 @@
 """Which effects are missing: forward selection with a family-wise level, exchange, backward elimination."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -69,6 +69,8 @@ class Selection:
         candidates: scan around the final model.
         tests: number of shapes of all candidates.
         whole: the same before what was no longer needed was taken out.
+        tried: what did not take the place of an effect, which a search that goes on from here tries only where it
+            promises more by then.
     """
 
     start: "Settled"
@@ -78,6 +80,7 @@ class Selection:
     candidates: tuple[Candidate, ...] = ()
     tests: int = 1
     whole: "Selection | None" = None
+    tried: Tried = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -115,6 +118,7 @@ def search(
     largest = np.zeros(len(bench.data.equations))
     tried: Tried = {}
     if begun is not None and begun.added:
+        tried.update(begun.tried)
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
         largest = _largest_changes(bench, now.fit, len(added))
@@ -144,7 +148,7 @@ def search(
             added.pop()
             now = before
             break
-    whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests)
+    whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
     return replace(whole, final=now, added=len(added), p_values=tuple(added), whole=whole)
 
