@@ -8,11 +8,13 @@ import pytest
 from sea_ident.discrepancy import beside_reversals
 from sea_ident.discrepancy.assess import detectability
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.beside_reversals import searched_beside_reversals
+from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.confirm import confirm
+from sea_ident.discrepancy.confirm import FAR, Confirmed, confirm
+from sea_ident.discrepancy.data import away_from_reversals
 from sea_ident.discrepancy.heldout import held_out
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
@@ -86,6 +88,29 @@ def test_the_samples_beside_reversals_show_it(sticking):
     for speed in (0.02, 0.04):
         truth = SIZE * np.exp(-((speed / SPEED) ** EXPONENT))
         assert size * np.exp(-((speed / effect.speed) ** effect.exponent)) == pytest.approx(truth, rel=0.2)
+
+
+@pytest.mark.scenario
+def test_what_only_the_slow_samples_show_is_found_once_the_rest_is_explained(
+    sticking, jittery, laboratory, monkeypatch
+):
+    bench, (near, _) = sticking
+
+    def without_the_slow(bench):
+        far = bench.comparing(away_from_reversals(bench.data, FAR))
+        start = settle(far, far.effects)
+        return Confirmed(Selection(start, start, 0, ()), far, start, start)
+
+    found = friction_of_the_slow(bench, without_the_slow(bench))
+    assert found is not None
+    assert named(found[1].selection) == [("stribeck_friction", "knee")]
+    np.testing.assert_array_equal(found[0].data.left_out, near.data.left_out)
+    # what only the usual samples need is found there and nowhere else
+    quiet = Bench(jittery, laboratory.effects)
+    assert friction_of_the_slow(quiet, without_the_slow(quiet)) is None
+    # and what leaves much there is not what made them differ
+    monkeypatch.setattr(beside_reversals, "lack_of_fit", lambda bench, now: (*lack_of_fit(bench, now)[:2], 0.0))
+    assert friction_of_the_slow(bench, without_the_slow(bench)) is None
 
 
 @pytest.mark.scenario

@@ -11,6 +11,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.decide import _better, decide, simplest_first
 from sea_ident.discrepancy.diagnose import _searched_beside, _tested
+from sea_ident.discrepancy.edges import at_centre
 from sea_ident.discrepancy.exchange import exchange
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import Kind, tried
@@ -21,6 +22,7 @@ from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.transfer import Transfer
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.effects import make_effect
+from sea_ident.effects.external_force import POINT
 
 JOINT = "knee"
 
@@ -152,8 +154,14 @@ def test_what_holds_there_as_well_stays_possible(rivals):
 
 
 @pytest.mark.scenario
-def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_turned_out_to_be(laboratory):
-    """Both effects are named wrongly, and both alternatives are right: neither is judged beside the other's error."""
+@pytest.mark.parametrize("by_its_shape", [False, True])
+def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_turned_out_to_be(
+    laboratory, monkeypatch, by_its_shape
+):
+    """Both effects are named wrongly, and both alternatives are right: neither is judged beside the other's error.
+
+    Whether the first gave way to an alternative or to another shape of its own.
+    """
     planted = [("spring_offset", JOINT, [0.5], {}), ("load_dependent_friction", "hip", [0.1], {})]
     bench = laboratory.bench(laboratory.record(planted, periods=6))
     other = Bench(laboratory.data(laboratory.record(planted, periods=5, seed=9, motion=1)), bench.effects)
@@ -174,6 +182,16 @@ def test_the_alternative_of_a_second_effect_is_weighed_beside_what_the_first_tur
         first + 1: (Alternative("load_dependent_friction", "hip", 1.0, fitted(wrong[0], right[1])),),
     }
     selection = Selection(start, Settled(own, start.noise), 2, (1e-9, 1e-9))
+    if by_its_shape:
+        best, listed[first] = listed[first][0].fit, ()
+
+        def shaped(bench, selection, held, position):
+            if position != first:
+                return selection, held
+            other = replace(selection, final=Settled(best, selection.final.noise))
+            return other, held.again(other)
+
+        monkeypatch.setattr("sea_ident.discrepancy.decide._with_its_best_shape", shaped)
     selection, left, _ = decide(bench, selection, listed, tried(other, selection, "another motion"))
     assert [e.name for e in selection.effects] == ["spring_offset", "load_dependent_friction"]
     assert left == {first: (), first + 1: ()}
@@ -284,3 +302,45 @@ def test_what_neither_explains_leans_to_none():
     both = [replace(t, statistic=t.statistic + left, excess=t.excess + left) for t in (better, worse)]
     assert not _better(*both)
     assert _better(both[0], replace(both[1], statistic=both[1].statistic + 0.2 * left))
+
+
+@pytest.fixture(scope="module")
+def pushed(laboratory):
+    """A push away from the centre of mass of the shank, found, and another motion of the same leg."""
+    push = make_effect("external_force", JOINT, start=1.2, stop=1.9, period=5.0)
+    planted = [(replace(push, point_z=0.1), np.array([8.0, 0.0, 4.0]))]
+    bench = laboratory.bench(laboratory.record(planted, periods=6))
+    other = Bench(laboratory.data(laboratory.record(planted, periods=6, seed=9, motion=1)), bench.effects)
+    start = settle(bench, bench.effects)
+    fit = refitted(bench, start.fit.effects, push, (), start.noise, start.fit.parameters)
+    selection = Selection(start, Settled(fit, start.noise), 1, (1e-9,))
+    return bench, selection, tried(other, selection, "another motion")
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("beyond_doubt", "on_the_centre"), [(1.1, True), (0.9, False)])
+def test_a_push_is_on_the_centre_of_mass_where_both_motions_together_say_so(
+    pushed, monkeypatch, beyond_doubt, on_the_centre
+):
+    """Its point bends to whatever else is missing: another motion weighs as much as this one."""
+    bench, selection, held = pushed
+    fit, noise, position = selection.final.fit, selection.final.noise, len(selection.start.fit.effects)
+    behind = at_centre(bench, fit, noise, position).statistic - fit.statistic
+    assert behind > 0.0
+    own = replace(held.transfers[0], statistic=2.0 * behind, excess=20.0)
+    there = replace(own, statistic=own.statistic - behind - beyond_doubt * own.margin)
+    held = replace(held, transfers=(own,))
+    monkeypatch.setattr(type(held), "worth", lambda *_: there)
+    monkeypatch.setattr(type(held), "again", lambda held, _: replace(held, transfers=(there,)))
+    found, _, held = decide(bench, selection, {position: ()}, held)
+    assert any(getattr(found.effects[0], name) for name in POINT) is not on_the_centre
+    assert (held.transfers[0] is there) is on_the_centre
+
+
+@pytest.mark.scenario
+def test_a_push_stays_where_both_motions_show_it(pushed):
+    bench, selection, held = pushed
+    found, _, after = decide(bench, selection, {len(selection.start.fit.effects): ()}, held)
+    assert found is selection
+    assert after is held
+    assert found.effects[0].point_z == pytest.approx(0.1, abs=0.01)

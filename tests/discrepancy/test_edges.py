@@ -124,6 +124,24 @@ def test_a_push_on_another_link_is_compared_when_its_edges_are_known(pushed_thig
 
 
 @pytest.mark.scenario
+def test_a_large_push_is_not_given_up_for_half_a_sample(laboratory):
+    """Beside the noise that is far more than it leaves in the end."""
+    push = make_effect("external_force", "hip", start=1.2012, stop=1.9013, period=PERIOD)
+    bench = laboratory.bench(laboratory.record([(push, np.array([400.0, 0.0, 200.0]))], periods=5))
+    now = settle(bench, bench.effects)
+    begun = bench.fit((*now.fit.effects, push), now.noise, start=now.fit.parameters)
+    noise = bench.noise(begun)
+    right = bench.fit(begun.effects, noise, start=begun.parameters)
+    beat = right.statistic + EQUALLY_GOOD
+    half = 0.5 * PERIOD / bench.data.samples
+    candidate = replace(push, start=push.start + half, stop=push.stop - half)
+    off = bench.fit((*right.effects[:-1], candidate), noise, start=right.parameters)
+    assert off.statistic > edges.FAR_ABOVE * beat
+    found = refitted(bench, right.effects[:-1], candidate, (), noise, right.parameters, beat)
+    assert found.statistic < beat
+
+
+@pytest.mark.scenario
 def test_a_push_on_a_link_is_not_one_on_the_axis_of_the_next_joint(pushed_thigh):
     """There it does the same, but at a place that must be found for that."""
     bench, now, shank, _ = pushed_thigh

@@ -1,5 +1,7 @@
 """A constant in a spring that another motion does not confirm: dry friction that does not slip remembers it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,3 +110,17 @@ def test_what_else_is_missing_on_the_other_motion_is_no_reason_for_such_an_eleme
     assert found.tested
     assert found.share > CONFIRMED
     assert remembering(bench, selection, held, len(selection.start.fit.effects)) is None
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("left", "taken"), [(80.0, False), (60.0, True)])
+def test_such_an_element_explains_most_of_what_the_constant_fails_to(laboratory, offset, monkeypatch, left, taken):
+    """Of 1000 it explains 900, and 120 are left: 100 are the most that the element could be the reason for."""
+    bench, selection = offset
+    other = laboratory.bench(laboratory.record([("spring_offset", JOINT, [HERE], {})], periods=8, seed=9, motion=1))
+    held = tried(other, selection, "another motion")
+    found = replace(held.transfers[0], tested=True, share=0.9, possible=1000.0, excess=120.0)
+    held = replace(held, transfers=(found,))
+    monkeypatch.setattr(type(held), "worth", lambda *_: replace(found, excess=left))
+    element = remembering(bench, selection, held, len(selection.start.fit.effects))
+    assert (element is not None) is taken

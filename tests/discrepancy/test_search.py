@@ -9,6 +9,7 @@ import pytest
 from sea_ident import side_by_side
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.exchange import Outdone
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, own_torque, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, LARGE_TORQUE, visible_changes
@@ -382,3 +383,21 @@ def test_a_search_is_lost_far_from_right_where_nothing_takes_most_of_what_is_lef
     before, now = (SimpleNamespace(fit=SimpleNamespace(statistic=s, dof=100, excess=s - 100)) for s in (1e5, statistic))
     candidates = [SimpleNamespace(gain=promised), SimpleNamespace(gain=0.0)]
     assert _lost(now, before, added, candidates) == lost
+
+
+def test_a_search_that_goes_on_knows_what_was_outdone_before(unequal, monkeypatch):
+    bench, found = unequal
+    outdone = {(("torque_offset", "knee"), ("torque_ripple", "knee")): Outdone(0.5, 0.1)}
+    assert found.tried
+    known = []
+
+    def exchanged(bench, now, added, tried, ruled_out):
+        known.append(dict(tried))
+        return now
+
+    monkeypatch.setattr("sea_ident.discrepancy.search.exchange", exchanged)
+    again = search(bench, bench.effects, replace(found, tried=outdone))
+    assert known[0] == outdone
+    assert outdone.items() <= again.tried.items()
+    search(bench, bench.effects, replace(found, tried={}))
+    assert known[-1] == {}
