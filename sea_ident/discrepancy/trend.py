@@ -12,6 +12,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off
+from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
 from sea_ident.discrepancy.trend_directions import (
     Direction,
@@ -188,11 +189,19 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
         column_p = best_trend(numbers, directions, middle, noise).p_value
     trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
     short = [_is_over_soon(bench, c.direction) and not trend.known for c, trend in zip(chosen, trends, strict=True)]
-    if any(short):
-        notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
-        chosen = [c for c, over in zip(chosen, short, strict=True) if not over]
+    notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
+    out = [over or _form_of_another(trends, k) for k, over in enumerate(short)]
+    if any(out):
+        chosen = [c for c, is_out in zip(chosen, out, strict=True) if not is_out]
         trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
+
+
+def _form_of_another(trends: Sequence[Trend], position: int) -> bool:
+    """Whether a trend is small beside another of its joint: the form of that one is known no better."""
+    own = trends[position]
+    of_the_joint = (t.torque_change for t in trends if t.effect.joint == own.effect.joint)
+    return own.torque_change < BESIDE_ANOTHER * max(of_the_joint)
 
 
 def within_periods(

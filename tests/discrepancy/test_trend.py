@@ -71,6 +71,17 @@ def test_a_third_drift_has_a_name_too(laboratory):
 
 
 @pytest.mark.scenario
+@pytest.mark.parametrize(("second", "joint", "named"), [(0.02, "knee", 1), (0.1, "knee", 2), (0.02, "hip", 2)])
+def test_what_the_form_of_a_large_drift_leaves_at_its_joint_is_no_other_drift(laboratory, second, joint, named):
+    planted = [
+        ("friction_drift", "knee", [0.0, 3.0], {}),
+        ("torque_constant_drift", joint, [second], {}),
+    ]
+    found = compared(laboratory.bench(laboratory.record(planted, periods=12)))
+    assert {(t.effect.name, t.effect.joint) for t in found.trends} == {(name, at) for name, at, *_ in planted[:named]}
+
+
+@pytest.mark.scenario
 def test_drifts_have_their_values(opposite):
     """Whichever time constant was taken: the change within the minute that was recorded."""
     for trend in opposite.trends:
