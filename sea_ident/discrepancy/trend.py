@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 from scipy.interpolate import interp1d
+from scipy.special import expit
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
@@ -24,7 +25,7 @@ from sea_ident.discrepancy.trend_directions import (
     steady_rows,
 )
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
-from sea_ident.discrepancy.trend_search import Chosen, alike, best_trend, find_trends
+from sea_ident.discrepancy.trend_search import Chosen, Sized, alike, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import Course, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
@@ -167,8 +168,11 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     directions = [replace(d, columns=scatter @ d.columns) for d in directions]
     change = _Change(bench, fit)
 
-    def matters(direction: Direction, values: FloatArray) -> bool:
-        return change(direction, values) >= SMALLEST_CHANGE
+    def matters(own: Sized, others: Sequence[Sized]) -> bool:
+        # the form of a large drift is known no better than that of any other effect
+        joint = own.direction.effect.joint
+        beside = max((change(*each) for each in others if each.direction.effect.joint == joint), default=0.0)
+        return change(*own) >= max(SMALLEST_CHANGE, BESIDE_ANOTHER * beside)
 
     chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters)
     whole = {cause.name: cause for cause in causes}
@@ -189,19 +193,11 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
         column_p = best_trend(numbers, directions, middle, noise).p_value
     trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
     short = [_is_over_soon(bench, c.direction) and not trend.known for c, trend in zip(chosen, trends, strict=True)]
-    notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
-    out = [over or _form_of_another(trends, k) for k, over in enumerate(short)]
-    if any(out):
-        chosen = [c for c, is_out in zip(chosen, out, strict=True) if not is_out]
+    if any(short):
+        notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
+        chosen = [c for c, over in zip(chosen, short, strict=True) if not over]
         trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
-
-
-def _form_of_another(trends: Sequence[Trend], position: int) -> bool:
-    """Whether a trend is small beside another of its joint: the form of that one is known no better."""
-    own = trends[position]
-    of_the_joint = (t.torque_change for t in trends if t.effect.joint == own.effect.joint)
-    return own.torque_change < BESIDE_ANOTHER * max(of_the_joint)
 
 
 def within_periods(
@@ -351,8 +347,8 @@ def _trend(
     if bends and not direction.bent:
         bent = max(bends, key=lambda d: gain(numbers, d, held)[0])
         rival, *_ = course_values(numbers, [_course(bent), *beside])
-        odds = np.exp(0.5 * (gain(numbers, bent, held)[0] - own.gain - FREE_BEND))
-        stds = _of_either(at_start, stds, _at_start(bent, rival.values), rival.stds, float(odds / (1.0 + odds)))
+        chance = float(expit(0.5 * (gain(numbers, bent, held)[0] - own.gain - FREE_BEND)))
+        stds = _of_either(at_start, stds, _at_start(bent, rival.values), rival.stds, chance)
     return Trend(
         effect=direction.effect,
         values=at_start,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -41,6 +42,13 @@ class Chosen:
         direction = self.direction
         own_course = direction.effect.name == "friction_drift" and direction.effect.joint in warmed
         return self.gain - PRICE_OF_A_BEND * (int(direction.bent) + int(own_course))
+
+
+class Sized(NamedTuple):
+    """A trend with its course and its values (k,)."""
+
+    direction: Direction
+    values: FloatArray
 
 
 def best_trend(
@@ -103,7 +111,7 @@ def find_trends(
     noise: NoiseFloor,
     most: int,
     level: float,
-    matters: Callable[[Direction, FloatArray], bool],
+    matters: Callable[[Sized, Sequence[Sized]], bool],
 ) -> list[Chosen]:
     """Trends that are there, the strongest first.
 
@@ -117,7 +125,7 @@ def find_trends(
         noise: noise floor.
         most: largest number.
         level: of the probability of naming one where there is none.
-        matters: whether a trend with its values is worth a name.
+        matters: whether a trend with its values is worth a name beside others with theirs.
 
     Returns:
         The trends.
@@ -128,8 +136,14 @@ def find_trends(
         if len({d.name for d in directions} - {d.name for d in others}) == 0:
             break
         new = best_trend(periods, directions, middle, noise, others)
-        if new.p_value > level or not matters(new.direction, _values(periods, new, others)):
+        if new.p_value > level:
             break
+        *beside, own = _sized(periods, [*named, new])
+        if not matters(own, ()):
+            break
+        if not matters(own, beside):
+            directions = [d for d in directions if d.name != own.direction.name]
+            continue
         named = _exchanged(periods, directions, middle, noise, [*named, new])
         if any(c.p_value > level for c in named):
             named = [c for c in named if c.p_value <= level]
@@ -149,6 +163,12 @@ def _exchanged(
         if [c.direction.name for c in named] == before:
             break
     return named
+
+
+def _sized(periods: FloatArray, chosen: Sequence[Chosen]) -> list[Sized]:
+    """Trends with the values that each has beside the others."""
+    held = [[other.direction for other in chosen if other is not own] for own in chosen]
+    return [Sized(own.direction, _values(periods, own, others)) for own, others in zip(chosen, held, strict=True)]
 
 
 def _values(periods: FloatArray, chosen: Chosen, held: Sequence[Direction]) -> FloatArray:
