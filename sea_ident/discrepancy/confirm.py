@@ -113,8 +113,7 @@ def _begun(far: Bench, confirmed: Confirmed, before: Settled) -> Selection | Non
         more = settle_again(far, whole.final.fit)
         if more.fit.excess < (1.0 - NEARLY_ALL) * there.fit.excess:
             found, there = whole, more
-    # among other samples another effect may do better after all
-    return replace(found, tried={}) if explains_nearly_all(far, confirmed.start.fit, there) else None
+    return found if explains_nearly_all(far, confirmed.start.fit, there) else None
 
 
 def explains_nearly_all(bench: Bench, start: Fit, final: Settled) -> bool:
@@ -153,7 +152,9 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     given_up = confirmed.selection.added > 0 and first.statistic > HOPELESS * first.dof
     if most < (1.0 - SLOW if given_up else PROMISING) * first.excess:
         return None
-    found = search(far, bench.effects, _begun(far, confirmed, before))
+    begun = _begun(far, confirmed, before)
+    # among other samples another effect may do better after all
+    found = search(far, bench.effects, None if begun is None else replace(begun, tried={}))
     fit = found.final.fit
     explained = lack_of_fit(far, found.final)[2] >= LACK_LEVEL
     if not found.added or not (explained or fit.excess < RESOLVED * first.excess):

@@ -99,10 +99,10 @@ def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
 def at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
     """A fit with a push on the centre of mass of its link; the same where it is one."""
     push = fit.effects[position]
-    at_centre = replace(push, **dict.fromkeys(POINT, 0.0))  # type: ignore[arg-type]
-    if at_centre == push:
+    centred = replace(push, **dict.fromkeys(POINT, 0.0))  # type: ignore[arg-type]
+    if centred == push:
         return fit
-    effects = [at_centre if k == position else effect for k, effect in enumerate(fit.effects)]
+    effects = [centred if k == position else effect for k, effect in enumerate(fit.effects)]
     centre = bench.fit(effects, noise, start=fit.parameters, tangents=False)
     return _sharpened(bench, centre, noise, position, 1.0, FINEST_STEP)
 

@@ -106,17 +106,17 @@ def propose(
     now = [separation(bench, noise, pair) for pair in pairs]
     robot, motors = _identified(model)
     attempt = _Attempt(bench, noise, pairs, robot, motors)
-    tried: list[_Tried | str] = []
+    tried: list[_Designed | str] = []
     attempts = side_by_side(attempt, [_Plan(DOptimality(), None, False, seed) for seed in SEEDS])
     for outcome in attempts:
         tried.append(outcome)
-        if isinstance(outcome, _Tried) and min(outcome.there) > PLENTY:
+        if isinstance(outcome, _Designed) and min(outcome.there) > PLENTY:
             break
     attempts.close()
     alone = _plan_for(robot, pairs[0])
-    if alone is not None and not any(isinstance(each, _Tried) and min(each.there) > ENOUGH for each in tried):
+    if alone is not None and not any(isinstance(each, _Designed) and min(each.there) > ENOUGH for each in tried):
         tried.append(attempt(alone))
-    designed = [each for each in tried if isinstance(each, _Tried)]
+    designed = [each for each in tried if isinstance(each, _Designed)]
     first, second = pairs[0].names
     if not designed:
         reasons = "; ".join(each for each in tried if isinstance(each, str))
@@ -178,7 +178,7 @@ class _Plan:
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class _Designed:
     """A motion, and the energy that tells each pair there, in units of the noise."""
 
     excitation: Excitation
@@ -217,7 +217,7 @@ class _Attempt:
     robot: Robot
     motors: PredictedMotors | None
 
-    def __call__(self, plan: _Plan) -> _Tried | str:
+    def __call__(self, plan: _Plan) -> _Designed | str:
         """The motion of a plan and what it shows of every pair; why there is none, where there is none."""
         bench = self.bench
         try:
@@ -239,7 +239,7 @@ class _Attempt:
         except (SeaIdentError, np.linalg.LinAlgError) as error:
             return str(error)
         there = Bench(_data_of(bench.data, self.robot, excitation.series, self.motors), bench.effects)
-        return _Tried(excitation, [separation(there, self.noise, pair) for pair in self.pairs])
+        return _Designed(excitation, [separation(there, self.noise, pair) for pair in self.pairs])
 
 
 def _rate(bench: Bench) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict, next_experiment
-from sea_ident.discrepancy.next_experiment import PLENTY, SEEDS, Pair, _data_of, _identified, _Tried, propose
+from sea_ident.discrepancy.next_experiment import PLENTY, SEEDS, Pair, _data_of, _Designed, _identified, propose
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.excitation import Discrimination, DOptimality
@@ -81,7 +81,7 @@ def test_a_motion_for_the_pair_alone_is_designed_where_no_wide_one_is_enough(leg
         def __call__(self, plan):
             criteria.append(plan.criterion.name)
             there = 40.0 if isinstance(plan.criterion, Discrimination) else widest - plan.seed
-            return _Tried(SimpleNamespace(to_dict=lambda: {"energy": there}), [there])
+            return _Designed(SimpleNamespace(to_dict=lambda: {"energy": there}), [there])
 
     monkeypatch.setattr(next_experiment, "_identified", lambda model: (leg, None))
     monkeypatch.setattr(next_experiment, "separation", lambda *_: 1.0)
