@@ -2,10 +2,9 @@
 
 What tells effect A from effect B is the part of the torque of A that the model with B, its parameters and shapes
 free, cannot follow (the noncentrality of the test between them; Atkinson and Fedorov, The design of experiments for
-discriminating between two rival models, Biometrika 62, 1975). That part of the whole effect of each, in the noise of
-the recording, is what motions are compared by, the worse of both counting. Motions for all parameters come first:
-they are designed in a fraction of the time, and most pairs are told by the widest of them as well as by any. Where
-none of them is enough, one is designed for that part of the columns of A.
+discriminating between two rival models, Biometrika 62, 1975). A motion is designed for that part of the columns of A;
+where that is not enough, motions for all parameters stand beside it. All are judged by that part of the whole effect
+of each in the noise of the recording, the worse of both counting.
 """
 
 import warnings as python_warnings
@@ -48,10 +47,7 @@ SAMPLES_PER_HARMONIC = 5
 """Samples of a proposed motion, per harmonic that is compared."""
 
 PLENTY = 100.0
-"""Energy, in units of the noise, beyond which no further motion is looked for, ..."""
-
-ENOUGH = 25.0
-"""... and from which on none is designed for the pair alone, which takes longer: five standard deviations."""
+"""Energy, in units of the noise, beyond which no further motion is looked for."""
 
 SMALLEST_ENERGY = 10.0
 """In units of the noise: less tells nothing apart."""
@@ -105,24 +101,24 @@ def propose(
     """
     now = [separation(bench, noise, pair) for pair in pairs]
     robot, motors = _identified(model)
-    attempt = _Attempt(bench, noise, pairs, robot, motors)
-    tried: list[_Designed | str] = []
-    attempts = side_by_side(attempt, [_Plan(DOptimality(), None, False, seed) for seed in SEEDS])
-    for outcome in attempts:
-        tried.append(outcome)
-        if isinstance(outcome, _Designed) and min(outcome.there) > PLENTY:
+    best: tuple[float, list[float], Excitation] | None = None
+    reasons: list[str] = []
+    attempts = side_by_side(_Attempt(bench, noise, pairs, robot, motors), _plans(robot, pairs[0]))
+    for attempt in attempts:
+        if isinstance(attempt, str):
+            reasons.append(attempt)
+            continue
+        excitation, there = attempt
+        score = float(np.sum(np.log(np.maximum(there, 1.0))))
+        if best is None or score > best[0]:
+            best = (score, there, excitation)
+        if min(there) > PLENTY:
             break
     attempts.close()
-    alone = _plan_for(robot, pairs[0])
-    if alone is not None and not any(isinstance(each, _Designed) and min(each.there) > ENOUGH for each in tried):
-        tried.append(attempt(alone))
-    designed = [each for each in tried if isinstance(each, _Designed)]
     first, second = pairs[0].names
-    if not designed:
-        reasons = "; ".join(each for each in tried if isinstance(each, str))
-        return None, (f"no next experiment was designed for {first} against {second}: {reasons}",)
-    best = max(designed, key=lambda each: float(np.sum(np.log(np.maximum(each.there, 1.0)))))
-    there, excitation = best.there, best.excitation
+    if best is None:
+        return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
+    _, there, excitation = best
     gains = [float(np.sqrt(new / max(old, 1.0))) for new, old in zip(there, now, strict=True)]
     told = [k for k in range(len(pairs)) if there[k] >= SMALLEST_ENERGY and gains[k] >= WORTHWHILE]
     untold = [pairs[k].names[1] for k in range(len(pairs)) if k not in told]
@@ -177,26 +173,18 @@ class _Plan:
     seed: int
 
 
-@dataclass(frozen=True, eq=False)
-class _Designed:
-    """A motion, and the energy that tells each pair there, in units of the noise."""
+def _plans(robot: Robot, pair: Pair) -> list[_Plan]:
+    """Motions for the columns of a pair first, then motions that are wide in all.
 
-    excitation: Excitation
-    there: list[float]
-
-
-def _plan_for(robot: Robot, pair: Pair) -> _Plan | None:
-    """A motion for the columns of a pair; None where an effect has none, as an error in the chain of signals.
-
-    Effects that show only beyond some border (play, the end of a range) have no slope to follow where a design starts,
-    so such a motion may show less of them than one that is wide in all.
+    Effects that show only beyond some border (play, the end of a range) have no slope to follow where a design starts.
     """
+    plans = [_Plan(DOptimality(), None, False, seed) for seed in SEEDS]
     own, rival = pair.own.effects[pair.own_position], pair.rival.effects[pair.rival_position]
-    if not (own.columns(robot) and rival.columns(robot)):
-        return None
-    known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
-    springs = any(e.side is Side.SPRING for e in (*known, own, rival))
-    return _Plan(Discrimination(own, (rival,)), known, springs, SEEDS[0])
+    if own.columns(robot) and rival.columns(robot):
+        known = tuple(e for k, e in enumerate(pair.own.effects) if k != pair.own_position and e.columns(robot))
+        springs = any(e.side is Side.SPRING for e in (*known, own, rival))
+        plans.insert(0, _Plan(Discrimination(own, (rival,)), known, springs, SEEDS[0]))
+    return plans
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +205,7 @@ class _Attempt:
     robot: Robot
     motors: PredictedMotors | None
 
-    def __call__(self, plan: _Plan) -> _Designed | str:
+    def __call__(self, plan: _Plan) -> tuple[Excitation, list[float]] | str:
         """The motion of a plan and what it shows of every pair; why there is none, where there is none."""
         bench = self.bench
         try:
@@ -239,7 +227,7 @@ class _Attempt:
         except (SeaIdentError, np.linalg.LinAlgError) as error:
             return str(error)
         there = Bench(_data_of(bench.data, self.robot, excitation.series, self.motors), bench.effects)
-        return _Designed(excitation, [separation(there, self.noise, pair) for pair in self.pairs])
+        return excitation, [separation(there, self.noise, pair) for pair in self.pairs]
 
 
 def _rate(bench: Bench) -> float:

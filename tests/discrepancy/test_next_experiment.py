@@ -2,17 +2,15 @@
 
 import warnings
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy import Verdict, next_experiment
-from sea_ident.discrepancy.next_experiment import PLENTY, SEEDS, Pair, _data_of, _Designed, _identified, propose
+from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.next_experiment import _data_of, _identified
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
-from sea_ident.excitation import Discrimination, DOptimality
 from sea_ident.motion import FourierSeries
 from sea_ident.simulation import PlantedEffect, simulate
 
@@ -65,31 +63,3 @@ def test_what_drifts_in_the_recording_is_not_in_the_proposed_motion(nothing_miss
     proposed = _data_of(data, laboratory.leg, laboratory.motions[1], None)
     assert proposed.samples < data.samples
     np.testing.assert_array_equal(proposed.target(proposed.tau_motor), 0.0)
-
-
-@pytest.mark.parametrize(("widest", "alone"), [(200.0, False), (30.0, False), (20.0, True)])
-def test_a_motion_for_the_pair_alone_is_designed_where_no_wide_one_is_enough(leg, monkeypatch, widest, alone):
-    """And the best of all is proposed, whichever it was designed for."""
-    own, rival = (make_effect(name, "hip") for name in ("stribeck_friction", "nonlinear_viscous_friction"))
-    pair = Pair(SimpleNamespace(effects=(own,)), 0, SimpleNamespace(effects=(rival,)), 0)
-    criteria = []
-
-    class Attempt:
-        def __init__(self, *_):
-            pass
-
-        def __call__(self, plan):
-            criteria.append(plan.criterion.name)
-            there = 40.0 if isinstance(plan.criterion, Discrimination) else widest - plan.seed
-            return _Designed(SimpleNamespace(to_dict=lambda: {"energy": there}), [there])
-
-    monkeypatch.setattr(next_experiment, "_identified", lambda model: (leg, None))
-    monkeypatch.setattr(next_experiment, "separation", lambda *_: 1.0)
-    monkeypatch.setattr(next_experiment, "_Attempt", Attempt)
-    monkeypatch.setattr(next_experiment, "side_by_side", lambda function, items: (function(each) for each in items))
-    found, notes = propose(None, None, [pair], None)
-    assert (criteria[-1] == Discrimination.name) is alone
-    assert criteria[:1] == [DOptimality.name]
-    assert len(criteria) == (1 if widest > PLENTY else len(SEEDS) + alone)
-    assert found.excitation["energy"] == (40.0 if alone else widest - SEEDS[0])
-    assert notes == ()
