@@ -1,14 +1,16 @@
 """What only the samples near reversals speak for is dropped, what holds elsewhere stays."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.columns import effect_key
-from sea_ident.discrepancy.confirm import Confirmed, _begun, confirm
+from sea_ident.discrepancy.confirm import Confirmed, _begun, confirm, without_the_slow
 from sea_ident.discrepancy.data import BARELY_SEEN, around_reversals, away_from_reversals
+from sea_ident.discrepancy.exchange import Outdone
 from sea_ident.discrepancy.judge import significance, torque_change
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
@@ -149,6 +151,26 @@ def test_a_search_with_fewer_samples_begins_with_what_was_taken_out_where_that_e
     # nothing more could be found beside that many
     full = replace(found, whole=replace(whole, added=MOST_EFFECTS))
     assert _begun(bench, Confirmed(full, bench, start, start), start) is None
+
+
+def test_a_search_with_fewer_samples_knows_nothing_of_what_was_outdone_among_the_others(rippled, monkeypatch):
+    bench, start, right = rippled
+    outdone = {(("torque_ripple", "hip"), ("torque_offset", "hip")): Outdone(0.5, 0.1)}
+    found = Selection(start, right, 1, (1e-9,), tried=outdone)
+    begun = []
+
+    def searched(far, effects, before):
+        begun.append(before)
+        return Selection(start, start, 0, ())
+
+    monkeypatch.setattr("sea_ident.discrepancy.confirm._begun", lambda *_: found)
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", searched)
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.scan", lambda far, fit, noise: [SimpleNamespace(gain=np.inf)])
+    assert without_the_slow(bench, Confirmed(found, bench, start, right)) is None
+    (before,) = begun
+    assert before.final is right
+    assert before.tried == {}
+    assert found.tried == outdone
 
 
 def test_what_explains_little_of_the_rest_is_not_begun_with(rippled):

@@ -54,6 +54,33 @@ def test_a_second_trend_is_not_what_the_course_of_the_first_leaves():
     assert found(flat, directions) == {("stiffness_drift", "hip")}
 
 
+@pytest.mark.parametrize(("alone", "named"), [(True, {"hip", "knee"}), (False, {"hip"})])
+def test_what_matters_but_beside_another_is_passed_over_and_what_does_not_is_the_end(alone, named):
+    """The second does not matter, beside the first or at all; the third does, where it comes to that."""
+    one, other, third = axes(3)
+    directions = [
+        *trend(one, "hip"),
+        *trend(0.6 * one + 0.8 * other, "hip", "torque_constant_drift"),
+        *trend(third, "knee"),
+    ]
+    sizes = (8.0, one), (4.0, 0.6 * one + 0.8 * other), (2.0, third)
+    flat = noisy(np.random.default_rng(11), *(np.outer(size * MIDDLE, c) for size, c in sizes))
+    beside = []
+
+    def matters(own, others):
+        if own.direction.effect.name != "torque_constant_drift":
+            return True
+        beside.extend(each for each in (own, *others) if others)
+        return alone and not others
+
+    chosen = find_trends(flat, directions, MIDDLE, FLOOR, 3, 1e-3, matters)
+    assert {c.direction.name for c in chosen} == {("stiffness_drift", joint) for joint in named}
+    if alone:
+        # each with the value that it has beside the other, not with what it would have to be without
+        own, first = (each.values[0] for each in beside)
+        assert first == pytest.approx(2.0 * own, rel=0.02)
+
+
 def test_a_straight_trend_is_called_straight():
     rng = np.random.default_rng(6)
     (one,) = axes(1)

@@ -1,5 +1,6 @@
 """Where a motor lingers, what no model has must not hide what the rest of the motion shows."""
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from sea_ident.effects import base_effects, spring_effects
 from sea_ident.motion import FourierSeries
 
 PERIOD = 5.0
+diagnosing = sys.modules["sea_ident.discrepancy.diagnose"]  # the function has the name of its module
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +113,24 @@ def test_what_explains_most_of_what_is_left_is_taken(lingering, monkeypatch, lef
     )
     second = without_the_slow(bench, Confirmed(Selection(start, start, 0, ()), bench, start, start))
     assert (second is not None) is taken
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_where_the_slow_samples_show_a_friction_they_are_compared_again(monkeypatch, shown):
+    """And nobody is told that they were left out."""
+    bench, far, near = (SimpleNamespace(effects=(), data=name) for name in ("usual", "far", "near"))
+    first, second, third = (SimpleNamespace(name=name, bench=far) for name in ("first", "second", "third"))
+    monkeypatch.setattr(diagnosing, "search", lambda *_, **__: None)
+    monkeypatch.setattr(diagnosing, "confirm", lambda *_: first)
+    monkeypatch.setattr(diagnosing, "unexplained", lambda confirmed: confirmed is first)
+    monkeypatch.setattr(diagnosing, "without_the_slow", lambda bench, confirmed: second)
+    monkeypatch.setattr(
+        diagnosing, "friction_of_the_slow", lambda *given: (near, third) if shown and given == (bench, second) else None
+    )
+    monkeypatch.setattr(diagnosing, "_compared", lambda *given: given)
+    monkeypatch.setattr(diagnosing.words, "slow_samples", lambda data: f"without the slow: {data}")
+    found = diagnosing._searched_mean(bench, None, lambda what, share: None)
+    assert found == ((near, third, None, ()) if shown else (far, second, None, ("without the slow: far",)))
 
 
 @pytest.mark.slow
