@@ -113,7 +113,7 @@ def test_what_else_is_missing_on_the_other_motion_is_no_reason_for_such_an_eleme
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize(("left", "taken"), [(80.0, False), (60.0, True)])
+@pytest.mark.parametrize(("left", "taken"), [(75.0, False), (65.0, True)])
 def test_such_an_element_explains_most_of_what_the_constant_fails_to(laboratory, offset, monkeypatch, left, taken):
     """Of 1000 it explains 900, and 120 are left: 100 are the most that the element could be the reason for."""
     bench, selection = offset
