@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.columns import Key, effect_key
+from sea_ident.discrepancy.columns import Key, Places, effect_key
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import nearly
 from sea_ident.discrepancy.judge import penalty
@@ -20,6 +20,7 @@ from sea_ident.effects import Effect, JointEffect, Side
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import EffectError
+from sea_ident.side_by_side import side_by_side
 
 SINGLE_PRECISION = 1e-4
 """Share of the power of a column that single precision does not tell from nothing."""
@@ -118,23 +119,10 @@ def scan(
     effects = candidate_effects(bench, fit.effects) if effects is None else effects
     if instead_of is not None:
         effects = [effect for effect in effects if instead_of.concerns(bench.equations_of(effect))]
-    tried = [shown for effect in effects if (shown := _promising(bench, model, effect)) is not None]
     found: list[Candidate] = []
-    for some in _chunks(tried):
-        # all together, for the basis is much larger than the columns of one
-        columns = np.concatenate([columns for each in some for columns in each.columns], axis=1)
-        across = fit.off(fit.off(columns))
-        begin = 0
-        for each in some:
-            shaped: list[Candidate] = []
-            for effect, norms in zip(each.variants, each.norms, strict=True):
-                own = across[:, begin : begin + len(norms)].copy()
-                begin += len(norms)
-                shaped.append(_exactly(bench, fit, left, effect, own, norms, each.tests))
-            if shaped:
-                order = _best_last(np.array([c.gain for c in shaped]), np.array([c.size for c in shaped]), EXACTLY)
-                best = shaped[order[-1]]
-                found.append(replace(best, effect=_with_smoothing_of(each.effect, best.effect)))
+    for part, places in side_by_side(_Compared(bench, fit, left, model), bench.in_two(effects)):
+        bench.remember(places)
+        found.extend(part)
     return sorted(found, key=lambda c: (-float(f"{c.gain:.9g}"), penalty(c.effect, bench)))
 
 
@@ -168,6 +156,45 @@ class _Model:
     whitener: NDArray[np.complex128]
     left: FloatArray
     basis: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Compares effects with a model.
+
+    Attributes:
+        bench: the recording.
+        fit: the model.
+        left: (M,) what it leaves, off all that is free.
+        model: the same in single precision.
+    """
+
+    bench: Bench
+    fit: Fit
+    left: FloatArray
+    model: "_Model"
+
+    def __call__(self, effects: Sequence[Effect]) -> tuple[list[Candidate], Places]:
+        """Those that can act here, each with its best shape, and where they act."""
+        bench, fit, left = self.bench, self.fit, self.left
+        tried = [shown for effect in effects if (shown := _promising(bench, self.model, effect)) is not None]
+        found: list[Candidate] = []
+        for some in _chunks(tried):
+            # all together, for the basis is much larger than the columns of one
+            columns = np.concatenate([columns for each in some for columns in each.columns], axis=1)
+            across = fit.off(fit.off(columns))
+            begin = 0
+            for each in some:
+                shaped: list[Candidate] = []
+                for effect, norms in zip(each.variants, each.norms, strict=True):
+                    own = across[:, begin : begin + len(norms)].copy()
+                    begin += len(norms)
+                    shaped.append(_exactly(bench, fit, left, effect, own, norms, each.tests))
+                if shaped:
+                    order = _best_last(np.array([c.gain for c in shaped]), np.array([c.size for c in shaped]), EXACTLY)
+                    best = shaped[order[-1]]
+                    found.append(replace(best, effect=_with_smoothing_of(each.effect, best.effect)))
+        return found, bench.places_of(effects)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,6 +27,9 @@ LABELS_KEPT = 1000
 Key = tuple[str, str | None, str]
 """Name of an effect, its joint, and the other joint where there is one."""
 
+Places: TypeAlias = dict[Key, IntArray]
+"""Equations (e,) that effects of a kind act in at a place."""
+
 DIGITS = 1e-7
 """Share of the largest column of an effect below which another is nothing but the digits of a description [-]."""
 
@@ -39,7 +43,8 @@ class Evaluated:
         columns: spectra (H + 1, E, k) of effects behind these.
         size: of the columns [bytes].
         labels: of the columns of effects.
-        places: (e,) equations that effects of a kind act in at a place.
+        places: of effects.
+        halves: which of two processes compares effects of a kind at a place: it has their columns.
         variants: equations (e,) and columns (H + 1, e, v, k) of an effect in several shapes.
         deflections: spectra (H,) of every link equation behind effects in the chain of signals.
         bodies: state of the mean, then of every period, and their rows (N', 2 n, k) of bodies and rotors.
@@ -49,7 +54,8 @@ class Evaluated:
     columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = field(default_factory=dict)
     size: int = 0
     labels: dict[Effect, tuple[Column, ...]] = field(default_factory=dict)
-    places: dict[Key, IntArray] = field(default_factory=dict)
+    places: Places = field(default_factory=dict)
+    halves: dict[Key, int] = field(default_factory=dict)
     variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = field(
         default_factory=dict
     )
@@ -100,6 +106,23 @@ class Columns:
     def equations_of(self, effect: Effect) -> IntArray | None:
         """Equations (e,) that an effect acts in, None where none of its kind at its place was evaluated yet."""
         return self._evaluated.places.get(effect_key(effect))
+
+    def places_of(self, effects: Sequence[Effect]) -> Places:
+        """Where effects act, of those that were evaluated yet."""
+        found = ((effect_key(effect), self.equations_of(effect)) for effect in effects)
+        return {key: equations for key, equations in found if equations is not None}
+
+    def remember(self, places: Places) -> None:
+        """Take over where effects act that were evaluated by another process."""
+        self._evaluated.places.update(places)
+
+    def in_two(self, effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
+        """Effects in two parts of about the same work, each always in the same."""
+        halves = self._evaluated.halves
+        for effect in effects:
+            halves.setdefault(effect_key(effect), len(halves) % 2)
+        first, second = (tuple(e for e in effects if halves[effect_key(e)] == half) for half in (0, 1))
+        return first, second
 
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
         """Columns of one effect in all its variants.

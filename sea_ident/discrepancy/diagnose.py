@@ -48,13 +48,14 @@ from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
-from sea_ident.side_by_side import side_by_side
+from sea_ident.side_by_side import follows, shared, side_by_side
 from sea_ident.simulation import Controller
 
 Progress = Callable[[str, float], None]
 
 
 @one_thread
+@shared
 def diagnose(
     model: Model,
     recording: Recording | ProcessedRecording,
@@ -90,7 +91,7 @@ def diagnose(
     expect(model, "diagnose: model", Model)
     expect(recording, "diagnose: recording", Recording, ProcessedRecording)
     expect_number(period, "diagnose: period", "s")
-    tell = progress or (lambda what, share: None)
+    tell = progress if progress is not None and not follows() else (lambda what, share: None)
     tell("reading the periods", 0.0)
     robot = model.robot
     check.models_match(model, reference)
@@ -163,7 +164,7 @@ def diagnose(
     diagnosis = replace(diagnosis, units=check.torque_units(robot))
     tell("done", 1.0)
     for text in diagnosis.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
     return diagnosis
 
 
