@@ -290,8 +290,9 @@ def _follow(work: Callable[[], object], here: Connection, there: Connection, cla
 
 def _about(item: object) -> object:
     """What an item is about, in a word: by that two processes know whether they are at the same step."""
-    if isinstance(item, (int, float, str)):
+    if isinstance(item, (int, str)):
         return item
     if isinstance(item, (tuple, list)):
         return tuple(_about(each) for each in item)
-    return repr(getattr(item, "effect", type(item).__name__))
+    effect = getattr(item, "effect", item)
+    return type(item).__name__, str(getattr(effect, "name", "")), str(getattr(effect, "joint", ""))

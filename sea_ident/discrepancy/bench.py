@@ -88,7 +88,7 @@ class Bench(ParameterFits):
 
     def __init__(self, data: PeriodData, effects: Sequence[Effect], evaluated: Evaluated | None = None) -> None:
         super().__init__(data, effects, evaluated)
-        self._periods = Periods(data, self._evaluated.bodies)
+        self._periods = Periods(data, self._evaluated.periods)
 
     def comparing(self, data: PeriodData) -> "Bench":
         """The same model and recording on another bench that compares other samples, or knows more of it.

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
+from zlib import crc32
 
 import numpy as np
 
@@ -34,6 +35,21 @@ DIGITS = 1e-7
 """Share of the largest column of an effect below which another is nothing but the digits of a description [-]."""
 
 
+@dataclass(frozen=True, eq=False)
+class PeriodStates:
+    """The mean of a recording and its periods, at fewer samples.
+
+    Attributes:
+        each: states (N') of the mean, then of every period.
+        joined: all of them, one after the other.
+        bodies: ((P + 1) N', 2 n, k) link and motor rows of bodies and rotors.
+    """
+
+    each: tuple[State, ...]
+    joined: State
+    bodies: FloatArray
+
+
 @dataclass(eq=False)
 class Evaluated:
     """What was evaluated on a recording, whichever of its samples are compared.
@@ -44,10 +60,9 @@ class Evaluated:
         size: of the columns [bytes].
         labels: of the columns of effects.
         places: of effects.
-        halves: which of two processes compares effects of a kind at a place: it has their columns.
         variants: equations (e,) and columns (H + 1, e, v, k) of an effect in several shapes.
         deflections: spectra (H,) of every link equation behind effects in the chain of signals.
-        bodies: state of the mean, then of every period, and their rows (N', 2 n, k) of bodies and rotors.
+        periods: the mean and every period.
     """
 
     states: dict[tuple[Effect, ...], State] = field(default_factory=dict)
@@ -55,12 +70,11 @@ class Evaluated:
     size: int = 0
     labels: dict[Effect, tuple[Column, ...]] = field(default_factory=dict)
     places: Places = field(default_factory=dict)
-    halves: dict[Key, int] = field(default_factory=dict)
     variants: dict[tuple[tuple[Effect, ...], tuple[Effect, ...]], tuple[IntArray, ComplexArray]] = field(
         default_factory=dict
     )
     deflections: dict[tuple[Effect, ...], dict[int, ComplexArray]] = field(default_factory=dict)
-    bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]] = field(default_factory=dict)
+    periods: dict[tuple[Effect, ...], PeriodStates] = field(default_factory=dict)
 
 
 class Columns:
@@ -117,12 +131,11 @@ class Columns:
         self._evaluated.places.update(places)
 
     def in_two(self, effects: Sequence[Effect]) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-        """Effects in two parts of about the same work, each always in the same."""
-        halves = self._evaluated.halves
-        for effect in effects:
-            halves.setdefault(effect_key(effect), len(halves) % 2)
-        first, second = (tuple(e for e in effects if halves[effect_key(e)] == half) for half in (0, 1))
-        return first, second
+        """Effects in two parts of about the same work, each always in the same: who compared it has its columns."""
+        joints = {joint: k for k, joint in enumerate(self.robot.joint_names)}
+        second = [(crc32(e.name.encode()) + joints.get(e.joint or "", 0)) % 2 for e in effects]
+        one, other = (tuple(e for e, part in zip(effects, second, strict=True) if part == k) for k in (0, 1))
+        return one, other
 
     def variant_spectra(self, variants: Sequence[Effect], effects: Sequence[Effect]) -> tuple[IntArray, ComplexArray]:
         """Columns of one effect in all its variants.

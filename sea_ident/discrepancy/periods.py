@@ -7,12 +7,15 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import successive
+from sea_ident.discrepancy.columns import PeriodStates
 from sea_ident.discrepancy.data import PeriodData, spectrum, towards
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, nearly, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Contribution, Effect, State, corrected_motion
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.memory import MemoryEffect
+from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
 PERIOD_SAMPLES = 2
@@ -27,10 +30,10 @@ class Periods:
 
     Args:
         data: the recording.
-        bodies: by effects in the chain of signals, the states and rows of bodies that were evaluated on it already.
+        bodies: by effects in the chain of signals, what was evaluated on it already.
     """
 
-    def __init__(self, data: PeriodData, bodies: dict[tuple[Effect, ...], list[tuple[State, FloatArray]]]) -> None:
+    def __init__(self, data: PeriodData, bodies: dict[tuple[Effect, ...], PeriodStates]) -> None:
         self.data = data
         self.robot = data.robot
         stride = max(1, data.samples // (PERIOD_SAMPLES * data.reach + 1))
@@ -67,12 +70,20 @@ class Periods:
         own = np.concatenate(
             [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
         )
-        acting = torques_of(rest, fit.parameters, self.robot)
+        states = self._states(moving(signals), tuple(bodies))
+        rows = states.bodies @ own
+        link, motor = rows[:, : self.robot.n].copy(), rows[:, self.robot.n :].copy()
+        for effect, values in torques_of(rest, fit.parameters, self.robot):
+            # all periods together cost little more than one; but what remembers its path begins each anew
+            pieces = _pieces(states) if isinstance(effect, MemoryEffect) else [(slice(None), states.joined)]
+            for piece, state in pieces:
+                add_torque(effect, values, state, link[piece], motor[piece])
         model = []
-        for state, body_rows in self._body_rows(moving(signals), tuple(bodies)):
-            rows = body_rows @ own
-            body = Contribution(rows[:, : self.robot.n], rows[:, self.robot.n :])
-            model.append(data.rows(model_torque(body, acting, signals, state)))
+        for piece, state in _pieces(states):
+            total = Contribution(link[piece], motor[piece])
+            for signal in signals:
+                total = signal.shifted(self.robot, state.motion.time, total)
+            model.append(data.rows(total))
         changes = (np.stack(model[1:], axis=1) - model[0][:, None]) * np.sqrt(data.periods)
         targets = np.stack([data.target(tau) for tau in data.period_tau_motor], axis=1)
         return targets - data.target(data.tau_motor)[:, None], changes
@@ -84,7 +95,7 @@ class Periods:
         """
         data, signals = self.data, signal_effects(fit.effects)
         bodies = tuple(e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia"))
-        states = [state for state, _ in self._body_rows(moving(signals), bodies)]
+        states = self._states(moving(signals), bodies).each
         torques = [
             data.tau_motor,
             *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor),
@@ -98,27 +109,34 @@ class Periods:
             found.append(spectrum(data.rows(part), data.harmonics))
         return np.asarray((np.stack(found[1:]) - found[0]) * np.sqrt(data.periods), dtype=np.complex128)
 
-    def _body_rows(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> list[tuple[State, FloatArray]]:
-        """State and rows (N', 2 n, k) of bodies and rotors of the mean, then of every period, at fewer samples."""
+    def _states(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> PeriodStates:
+        """The mean and the periods behind effects in the chain of signals."""
         signals = nearly(signals, AMOUNT_DIGITS)
         if signals not in self._period_bodies:
             if len(self._period_bodies) > 3:
                 self._period_bodies.clear()
-            found = []
             mean = self.data.motion
-            for motion in (mean, *towards(mean, self.data.period_motions, 1.0 / np.sqrt(self.data.periods))):
-                thin = corrected_motion(self.robot, signals, motion)[:: self._stride]
-                state = State(self.robot, thin, _thinned(self.data.channels, self._stride))
-                parts = [body.evaluate(state) for body in bodies]
-                width = 2 * self.robot.n
-                rows = np.concatenate(
-                    [np.concatenate([part.link, part.motor], axis=1) for part in parts]
-                    or [np.zeros((len(thin), width, 0))],
-                    axis=2,
-                )
-                found.append((State(self.robot, thin, state.channels), rows))
-            self._period_bodies[signals] = found
+            motions = (mean, *towards(mean, self.data.period_motions, 1.0 / np.sqrt(self.data.periods)))
+            thin = [corrected_motion(self.robot, signals, motion)[:: self._stride] for motion in motions]
+            channels = {kind: values[:: self._stride] for kind, values in self.data.channels.items()}
+            many = {kind: np.concatenate([values] * len(thin)) for kind, values in channels.items()}
+            joined = State(self.robot, Motion.concatenate(thin), many)
+            parts = [body.evaluate(joined) for body in bodies]
+            rows = [np.concatenate([part.link, part.motor], axis=1) for part in parts]
+            nothing = np.zeros((len(joined.motion), 2 * self.robot.n, 0))
+            # other states than those of the bodies, for these keep their regressor
+            self._period_bodies[signals] = PeriodStates(
+                tuple(State(self.robot, motion, channels) for motion in thin),
+                State(self.robot, joined.motion, many),
+                np.concatenate([nothing, *rows], axis=2),
+            )
         return self._period_bodies[signals]
+
+
+def _pieces(states: PeriodStates) -> list[tuple[slice, State]]:
+    """The rows of the mean and of every period, and its state."""
+    length = len(states.each[0].motion)
+    return [(slice(k * length, (k + 1) * length), state) for k, state in enumerate(states.each)]
 
 
 def torques_of(
@@ -142,15 +160,16 @@ def model_torque(
     """
     link, motor = begun.link.copy(), begun.motor.copy()
     for effect, values in acting:
-        part = effect.evaluate(state)
-        joint = slice(None) if part.joint is None else part.joint
-        link[:, joint] += part.link[:, joint] @ values
-        motor[:, joint] += part.motor[:, joint] @ values
+        add_torque(effect, values, state, link, motor)
     total = Contribution(link, motor)
     for signal in signals:
         total = signal.shifted(state.robot, state.motion.time, total)
     return total
 
 
-def _thinned(channels: Mapping[str, FloatArray], stride: int) -> dict[str, FloatArray]:
-    return {kind: values[::stride] for kind, values in channels.items()}
+def add_torque(effect: Effect, values: FloatArray, state: State, link: FloatArray, motor: FloatArray) -> None:
+    """Add the torque of an effect with these values (k,) of its columns to that at links and motors (N, n)."""
+    part = effect.evaluate(state)
+    joint = slice(None) if part.joint is None else part.joint
+    link[:, joint] += part.link[:, joint] @ values
+    motor[:, joint] += part.motor[:, joint] @ values

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
 from sea_ident.regressor import prior_parameters
+from sea_ident.side_by_side import side_by_side
 
 FAR = 3.0
 """Statistic over degrees of freedom beyond which the shapes of the model are left alone, for they would bend to the
@@ -59,9 +60,19 @@ def settle_again(bench: Bench, fit: Fit) -> Settled:
     noise = bench.noise(fit)
     anchored = bench.anchored(fit.effects, fit.parameters)
     bench.release(anchored)
-    bent = bench.refine(anchored, noise, start=fit.parameters)
+
+    def refined(only: int) -> Solution:
+        return bench.refine(anchored, noise, start=fit.parameters, only=only).solution
+
+    whole, added = 0, len(bench.effects)
+    if bench.statistic(fit, noise) > FAR * fit.dof:
+        # it will be as far hardly without all of its shapes: both at once
+        ways = side_by_side(refined, (whole, added))
+    else:
+        ways = map(refined, (whole, added))
+    bent = bench.again(next(ways), noise)
     if bent.statistic > FAR * bent.dof:
-        straight = bench.refine(anchored, noise, start=fit.parameters, only=len(bench.effects))
+        straight = bench.again(next(ways), noise)
         if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
             return Settled(straight, noise)
     return Settled(bent, noise)
