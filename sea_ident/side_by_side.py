@@ -69,7 +69,7 @@ def shared(function: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]:
 
 
 def side_by_side(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> Generator[_Result, None, None]:
-    """Results of a function in the order of its items, of which the two processes of a `shared` function do a part each.
+    """Results of a function in the order of its items; the two processes of a `shared` function do a part of them each.
 
     The results are those of a loop, and outside such a function it is one. So the function must be pure: what it
     changes is not seen where the other process did it. Nothing is begun before the first result is asked for.
@@ -122,7 +122,9 @@ class _Pair:
     at_work = 0
     """Pairs that there are: one is enough."""
 
-    def __init__(self, connection: Connection, claims: mmap, process: multiprocessing.process.BaseProcess | None) -> None:
+    def __init__(
+        self, connection: Connection, claims: mmap, process: multiprocessing.process.BaseProcess | None
+    ) -> None:
         self._connection, self._claims, self._process = connection, claims, process
         self._next = self._sign = 0
         self._busy = self._lost = False
@@ -256,14 +258,18 @@ class _Pair:
             os._exit(0)
         self._process.kill()
 
+    def finish(self) -> None:
+        """Wait until all is sent."""
+        self._outgoing.put(None)
+        self._sender.join()
+
     def stop(self) -> None:
         """Stop the copy."""
         if self._process is not None:
             self._process.kill()
             self._process.join()
             self._process.close()
-        self._outgoing.put(None)
-        self._sender.join()
+        self.finish()
         self._connection.close()
         self._claims.close()
         _Pair.at_work -= 1
@@ -282,8 +288,10 @@ def _follow(work: Callable[[], object], here: Connection, there: Connection, cla
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
         sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - as long as the process lives
-        _PAIR.set(_Pair(there, claims, None))
+        pair = _Pair(there, claims, None)
+        _PAIR.set(pair)
         work()
+        pair.finish()
     finally:
         os._exit(0)  # no output is to be flushed and nothing cleaned up: all that belongs to the other process
 

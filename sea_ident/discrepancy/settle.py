@@ -1,6 +1,6 @@
 """A model in the noise floor that belongs to it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,11 +65,9 @@ def settle_again(bench: Bench, fit: Fit) -> Settled:
         return bench.refine(anchored, noise, start=fit.parameters, only=only).solution
 
     whole, added = 0, len(bench.effects)
-    if bench.statistic(fit, noise) > FAR * fit.dof:
-        # it will be as far hardly without all of its shapes: both at once
-        ways = side_by_side(refined, (whole, added))
-    else:
-        ways = map(refined, (whole, added))
+    # where it is far, both will be wanted
+    far = bench.statistic(fit, noise) > FAR * fit.dof
+    ways: Iterator[Solution] = side_by_side(refined, (whole, added)) if far else map(refined, (whole, added))
     bent = bench.again(next(ways), noise)
     if bent.statistic > FAR * bent.dof:
         straight = bench.again(next(ways), noise)

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident import side_by_side
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.free_shapes import is_signal
@@ -22,12 +21,6 @@ from sea_ident.discrepancy.next_effect import (
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    """What another process tries is not noted here."""
-    monkeypatch.setattr(side_by_side, "_cores", lambda: 1)
 
 
 @pytest.mark.scenario

@@ -37,12 +37,15 @@ def unequal(laboratory):
 def test_two_processes_find_what_one_does(unequal, monkeypatch):
     """To the last digit."""
     bench, alone = unequal
-    copies = []
-    make = side_by_side._Copy.__init__
-    monkeypatch.setattr(side_by_side._Copy, "__init__", lambda *args: copies.append(make(*args)))
+    received = []
+    receive = side_by_side._Pair._take
+    monkeypatch.setattr(
+        side_by_side._Pair, "_take", lambda *args: (received.append(len(args[0]._received)), receive(*args))
+    )
     monkeypatch.setattr(side_by_side, "_cores", lambda: 2)
-    both = search(Bench(bench.data, bench.effects), bench.effects)
-    assert copies or not side_by_side.second_core()
+    there = side_by_side.second_core()
+    both = side_by_side.shared(search)(Bench(bench.data, bench.effects), bench.effects)
+    assert sum(received) > 10 or not there
     assert both.effects == alone.effects
     assert both.p_values == alone.p_values
     assert both.final.fit.parameters == alone.final.fit.parameters
