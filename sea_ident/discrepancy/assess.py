@@ -67,7 +67,7 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
     positions = range(len(now.fit.effects) - selection.added, len(now.fit.effects))
     return {
         position: tuple(replace(each, fit=bench.again(solution, now.noise)) for each, solution in alike)
-        for position, alike in zip(positions, side_by_side(_Rivals(bench, now), positions), strict=True)
+        for position, alike in zip(positions, map(_Rivals(bench, now), positions), strict=True)
     }
 
 

@@ -23,6 +23,7 @@ from sea_ident.effects import Contribution, Effect, State, corrected_motion
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.stribeck_friction import StribeckFriction
 from sea_ident.motion import Motion
+from sea_ident.side_by_side import side_by_side
 
 MOVES_ON = 0.02
 """Time for which a motor must keep moving to have been let go [s]."""
@@ -138,15 +139,18 @@ def breakaway_excess(bench: Bench, fit: Fit, joint: str) -> FloatArray:
     # as long as the torque takes to follow: a quarter of the shortest period that it has
     window = int(data.period / (4.0 * data.reach) / interval)
     lasts = max(window + 1, round(MOVES_ON / interval))
-    found = []
-    for motion, torque in zip(motions, data.period_tau_motor, strict=True):
-        events = let_go(motion.dtheta[:, index], known, lasts)
-        if events:
-            state = State(robot, _sliding(motion, index, events, lasts, SLIDES * smoothing), data.channels)
-            left = data.target(torque)[:, row] - data.rows(model_torque(nothing, acting, signals, state))[:, row]
-            at = [(np.arange(k, k + window + 1) % len(left), direction) for k, direction in events]
-            found.append(float(np.mean([direction * np.mean(left[rows]) for rows, direction in at])))
-    return np.array(found)
+
+    def of_pass(period: int) -> float | None:
+        events = let_go(motions[period].dtheta[:, index], known, lasts)
+        if not events:
+            return None
+        state = State(robot, _sliding(motions[period], index, events, lasts, SLIDES * smoothing), data.channels)
+        torque = data.target(data.period_tau_motor[period])[:, row]
+        left = torque - data.rows(model_torque(nothing, acting, signals, state))[:, row]
+        at = [(np.arange(k, k + window + 1) % len(left), direction) for k, direction in events]
+        return float(np.mean([direction * np.mean(left[rows]) for rows, direction in at]))
+
+    return np.array([found for found in side_by_side(of_pass, range(data.periods)) if found is not None])
 
 
 def let_go(speed: FloatArray, known: float, lasts: int) -> list[tuple[int, int]]:

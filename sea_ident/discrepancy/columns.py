@@ -37,17 +37,21 @@ DIGITS = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class PeriodStates:
-    """The mean of a recording and its periods, at fewer samples.
+    """The mean of a recording and some of its periods, at fewer samples.
 
     Attributes:
-        each: states (N') of the mean, then of every period.
+        each: S states (N').
         joined: all of them, one after the other.
-        bodies: ((P + 1) N', 2 n, k) link and motor rows of bodies and rotors.
+        bodies: (S N', 2 n, k) link and motor rows of bodies and rotors.
     """
 
     each: tuple[State, ...]
     joined: State
     bodies: FloatArray
+
+
+KeptPeriods: TypeAlias = dict[tuple[tuple[Effect, ...], int], PeriodStates]
+"""The mean (0) and some periods, by effects in the chain of signals and the first of them."""
 
 
 @dataclass(eq=False)
@@ -62,7 +66,7 @@ class Evaluated:
         places: of effects.
         variants: equations (e,) and columns (H + 1, e, v, k) of an effect in several shapes.
         deflections: spectra (H,) of every link equation behind effects in the chain of signals.
-        periods: the mean and every period.
+        periods: the mean and the periods.
     """
 
     states: dict[tuple[Effect, ...], State] = field(default_factory=dict)
@@ -74,7 +78,7 @@ class Evaluated:
         default_factory=dict
     )
     deflections: dict[tuple[Effect, ...], dict[int, ComplexArray]] = field(default_factory=dict)
-    periods: dict[tuple[Effect, ...], PeriodStates] = field(default_factory=dict)
+    periods: KeptPeriods = field(default_factory=dict)
 
 
 class Columns:

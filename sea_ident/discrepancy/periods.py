@@ -1,13 +1,13 @@
 """The periods of a recording in the light of a model."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import successive
-from sea_ident.discrepancy.columns import PeriodStates
+from sea_ident.discrepancy.columns import KeptPeriods, PeriodStates
 from sea_ident.discrepancy.data import PeriodData, spectrum, towards
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, nearly, signal_effects
@@ -17,6 +17,7 @@ from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
+from sea_ident.side_by_side import side_by_side
 
 PERIOD_SAMPLES = 2
 """Samples of a single period that its model torque is computed at, per harmonic of its motion."""
@@ -25,20 +26,27 @@ AMOUNT_DIGITS = 3
 """Digits of errors in the chain of signals that periods are compared behind: they are the same in all of them."""
 
 
+BODIES = "rigid_bodies", "rotor_inertia"
+"""Effects whose columns cost the most."""
+
+STATES_KEPT = 6
+"""Halves of the periods, each behind other effects in the chain of signals, that are kept."""
+
+
 class Periods:
     """Evaluates models on every period; what was computed once is kept.
 
     Args:
         data: the recording.
-        bodies: by effects in the chain of signals, what was evaluated on it already.
+        kept: what was evaluated on it already.
     """
 
-    def __init__(self, data: PeriodData, bodies: dict[tuple[Effect, ...], PeriodStates]) -> None:
+    def __init__(self, data: PeriodData, kept: KeptPeriods) -> None:
         self.data = data
         self.robot = data.robot
         stride = max(1, data.samples // (PERIOD_SAMPLES * data.reach + 1))
         self._stride = next(s for s in range(stride, 0, -1) if data.samples % s == 0)
-        self._period_bodies = bodies
+        self._kept = kept
 
     def residuals(self, fit: Fit) -> ComplexArray:
         """(P, H + 1, E) residuals of every period from its own signals, scaled as that of the mean."""
@@ -64,13 +72,22 @@ class Periods:
         velocity across the turn of friction that the mean, P times better known, stays on one side of.
         """
         data = self.data
+        # each process keeps the states of its half
+        halves = range(self._middle), range(self._middle, data.periods + 1)
+        model = np.concatenate(list(side_by_side(_Modelled(self, fit), halves)), axis=1)
+        changes = (model[:, 1:] - model[:, :1]) * np.sqrt(data.periods)
+        targets = np.stack([data.target(tau) for tau in data.period_tau_motor], axis=1)
+        return targets - data.target(data.tau_motor)[:, None], changes
+
+    def torque(self, fit: Fit, which: range) -> FloatArray:
+        """(N', S, E) torque of a model in the mean (0) and in periods (from 1 on)."""
         signals = signal_effects(fit.effects)
-        bodies = [e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia")]
-        rest = [e for e in fit.effects if e.name not in ("rigid_bodies", "rotor_inertia")]
+        bodies = [e for e in fit.effects if e.name in BODIES]
+        rest = [e for e in fit.effects if e.name not in BODIES]
         own = np.concatenate(
             [np.array([fit.parameters[c.name] for c in e.columns(self.robot)]) for e in bodies] or [np.zeros(0)]
         )
-        states = self._states(moving(signals), tuple(bodies))
+        states = self._states(moving(signals), tuple(bodies), which)
         rows = states.bodies @ own
         link, motor = rows[:, : self.robot.n].copy(), rows[:, self.robot.n :].copy()
         for effect, values in torques_of(rest, fit.parameters, self.robot):
@@ -78,15 +95,13 @@ class Periods:
             pieces = _pieces(states) if isinstance(effect, MemoryEffect) else [(slice(None), states.joined)]
             for piece, state in pieces:
                 add_torque(effect, values, state, link[piece], motor[piece])
-        model = []
+        found = []
         for piece, state in _pieces(states):
             total = Contribution(link[piece], motor[piece])
             for signal in signals:
                 total = signal.shifted(self.robot, state.motion.time, total)
-            model.append(data.rows(total))
-        changes = (np.stack(model[1:], axis=1) - model[0][:, None]) * np.sqrt(data.periods)
-        targets = np.stack([data.target(tau) for tau in data.period_tau_motor], axis=1)
-        return targets - data.target(data.tau_motor)[:, None], changes
+            found.append(self.data.rows(total))
+        return np.stack(found, axis=1)
 
     def column_changes(self, effect: TrendEffect, fit: Fit) -> ComplexArray:
         """(P, H + 1, E, k) what the columns of a trend are in every period beyond those of the mean, unscaled.
@@ -94,8 +109,9 @@ class Periods:
         A spring that softens is deflected more and more: the columns of one period are not those of another.
         """
         data, signals = self.data, signal_effects(fit.effects)
-        bodies = tuple(e for e in fit.effects if e.name in ("rigid_bodies", "rotor_inertia"))
-        states = self._states(moving(signals), bodies).each
+        bodies = tuple(e for e in fit.effects if e.name in BODIES)
+        halves = range(self._middle), range(self._middle, data.periods + 1)
+        states = [state for half in halves for state in self._states(moving(signals), bodies, half).each]
         torques = [
             data.tau_motor,
             *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor),
@@ -109,14 +125,20 @@ class Periods:
             found.append(spectrum(data.rows(part), data.harmonics))
         return np.asarray((np.stack(found[1:]) - found[0]) * np.sqrt(data.periods), dtype=np.complex128)
 
-    def _states(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...]) -> PeriodStates:
-        """The mean and the periods behind effects in the chain of signals."""
+    @property
+    def _middle(self) -> int:
+        """Number of the mean and the first periods: half of all."""
+        return self.data.periods // 2 + 1
+
+    def _states(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...], which: range) -> PeriodStates:
+        """The mean (0) and periods (from 1 on) behind effects in the chain of signals."""
         signals = nearly(signals, AMOUNT_DIGITS)
-        if signals not in self._period_bodies:
-            if len(self._period_bodies) > 3:
-                self._period_bodies.clear()
-            mean = self.data.motion
-            motions = (mean, *towards(mean, self.data.period_motions, 1.0 / np.sqrt(self.data.periods)))
+        if (signals, which.start) not in self._kept:
+            if len(self._kept) > STATES_KEPT:
+                self._kept.clear()
+            mean, data = self.data.motion, self.data
+            some = data.period_motions[max(which.start - 1, 0) : which.stop - 1]
+            motions = towards(mean, [*([mean] if 0 in which else []), *some], 1.0 / np.sqrt(data.periods))
             thin = [corrected_motion(self.robot, signals, motion)[:: self._stride] for motion in motions]
             channels = {kind: values[:: self._stride] for kind, values in self.data.channels.items()}
             many = {kind: np.concatenate([values] * len(thin)) for kind, values in channels.items()}
@@ -125,12 +147,29 @@ class Periods:
             rows = [np.concatenate([part.link, part.motor], axis=1) for part in parts]
             nothing = np.zeros((len(joined.motion), 2 * self.robot.n, 0))
             # other states than those of the bodies, for these keep their regressor
-            self._period_bodies[signals] = PeriodStates(
+            self._kept[signals, which.start] = PeriodStates(
                 tuple(State(self.robot, motion, channels) for motion in thin),
                 State(self.robot, joined.motion, many),
                 np.concatenate([nothing, *rows], axis=2),
             )
-        return self._period_bodies[signals]
+        return self._kept[signals, which.start]
+
+
+@dataclass(frozen=True, eq=False)
+class _Modelled:
+    """Evaluates a model on periods.
+
+    Attributes:
+        periods: the recording.
+        fit: the model.
+    """
+
+    periods: Periods
+    fit: Fit
+
+    def __call__(self, which: range) -> FloatArray:
+        """(N', S, E) torque of the model in the mean (0) and in periods (from 1 on)."""
+        return self.periods.torque(self.fit, which)
 
 
 def _pieces(states: PeriodStates) -> list[tuple[slice, State]]:
