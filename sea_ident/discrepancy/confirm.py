@@ -14,6 +14,7 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.side_by_side import side_by_side
 
 FAR = 6
 """How many times the usual is left out around reversals where the search is repeated without what is slow."""
@@ -80,19 +81,21 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         return Confirmed(selection, away, start, start)
     final = settle_again(away, selection.final.fit)
     steps = flat_steps(away, final)
-    weak = []
     first = len(final.fit.effects) - selection.added
-    for k in range(selection.added):
-        others = [e for position, e in enumerate(final.fit.effects) if position != first + k]
+
+    def is_weak(position: int) -> bool:
+        others = [e for k, e in enumerate(final.fit.effects) if k != position]
         less = away.refine(others, final.noise, start=final.fit.parameters, only=len(away.effects))
         loss = less.statistic - final.fit.statistic
-        columns = max(len(final.fit.effects[first + k].columns(away.robot)), 1)
+        columns = max(len(final.fit.effects[position].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
         by_chance = max(p_value, scatter_p(steps, less.whitened - final.fit.whitened))
-        if by_chance > FAMILY_LEVEL or torque_change(away, final.fit, less) < SMALLEST_SHARE:
-            rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
-            if not lets_go_late(bench, rest, final.fit.effects[first + k]):
-                weak.append(k)
+        if by_chance <= FAMILY_LEVEL and torque_change(away, final.fit, less) >= SMALLEST_SHARE:
+            return False
+        rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
+        return not lets_go_late(bench, rest, final.fit.effects[position])
+
+    weak = [k for k, out in enumerate(side_by_side(is_weak, range(first, len(final.fit.effects)))) if out]
     found = Confirmed(selection, away, start, final)
     return found.less(without(bench, selection, weak)) if weak else found
 

@@ -29,6 +29,7 @@ from sea_ident.discrepancy.trend_search import Chosen, Sized, alike, best_trend,
 from sea_ident.discrepancy.trend_values import Course, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.side_by_side import side_by_side
 
 SURE = 3.0
 """Standard deviations by which a value of a trend that bends must differ from zero, its course free [-]."""
@@ -149,7 +150,8 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
         return TrendTest(min(1.0, 2.0 * omnibus), (), omnibus < LEVEL)
     space = column_space(causes)
     numbers = flat @ space
-    directions = [d for cause in causes for d in courses(cause, columns.within(cause, space), middle)]
+    within = side_by_side(lambda cause: columns.within(cause, space), causes)
+    directions = [d for cause, own in zip(causes, within, strict=True) for d in courses(cause, own, middle)]
     notes: tuple[str, ...] = ()
     if periods > FEWEST_AFTER_START:
         later = flat[1:] - flat[1:].mean(axis=0)

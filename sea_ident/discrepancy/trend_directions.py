@@ -197,9 +197,11 @@ class PeriodColumns:
         """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""
         if not isinstance(cause.effect, TrendEffect):
             raise TypeError(f"{cause.effect.name} is no trend")
-        changes = self._bench.period_column_changes(cause.effect, self._fit)
-        each = [cause.columns + self.flat(change) for change in changes]
-        return np.stack(each if space is None else [space.T @ columns for columns in each])
+        changes = np.moveaxis(self._bench.period_column_changes(cause.effect, self._fit), 0, 2)
+        # those of all periods at once, for what is done to one column costs little more for many
+        flat = self.flat(changes.reshape(*changes.shape[:2], -1)).reshape(-1, *changes.shape[2:])
+        each = np.moveaxis(cause.columns[:, None] + flat, 1, 0)
+        return np.asarray(each if space is None else space.T @ each, dtype=np.float64)
 
 
 def courses(cause: Cause, columns: FloatArray, middle: FloatArray) -> list[Direction]:

@@ -23,7 +23,7 @@ from itertools import combinations
 import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.creeping import Creep, creeping, no_dry_friction
 from sea_ident.discrepancy.end_stops import EndStop, end_stops
 from sea_ident.discrepancy.fit import Fit, Solution
@@ -124,7 +124,7 @@ def unnamed(
         return best[0] if best is not None and _holds(best[1], selection, held, position) else None
 
     positions = range(len(now.fit.effects) - selection.added, len(now.fit.effects))
-    return (*pairs, *(found for found in side_by_side(in_place_of, positions) if found is not None))
+    return (*pairs, *(found for found in map(in_place_of, positions) if found is not None))
 
 
 def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:
@@ -188,26 +188,46 @@ def _best(bench: Bench, now: Settled, position: int, outside: tuple[Effect, ...]
         return None
     reduced = bench.fit(others, noise, start=fit.parameters)
     gain = reduced.statistic - fit.statistic
-    best: tuple[Unnamed, Fit] | None = None
+    promising = [c for c in scan(bench, reduced, noise, family)[:TRIED] if not c.gain < PROMISED * gain]
     better = EQUALLY_GOOD + 2.0 * float(np.log(len(family)))
-    for candidate in scan(bench, reduced, noise, family)[:TRIED]:
-        if candidate.gain < PROMISED * gain:
-            continue
-        before, after, beat = others[:position], others[position:], OF_INTEREST * fit.statistic
+    found = side_by_side(_InPlace(bench, now, position, better), promising)
+    best = min((each for each in found if each is not None), key=lambda each: each.share, default=None)
+    return None if best is None else (best, bench.again(best.solution, noise))
+
+
+@dataclass(frozen=True, eq=False)
+class _InPlace:
+    """Tries relatives in the place of an effect.
+
+    Attributes:
+        bench: the recording.
+        now: the model.
+        position: of the effect in it.
+        better: by how much the statistic must come down, in units of what is left.
+    """
+
+    bench: Bench
+    now: Settled
+    position: int
+    better: float
+
+    def __call__(self, candidate: Candidate) -> Unnamed | None:
+        """A relative with the model with it, None where it does not explain much more."""
+        bench, fit, noise, position = self.bench, self.now.fit, self.now.noise, self.position
+        before, after, beat = fit.effects[:position], fit.effects[position + 1 :], OF_INTEREST * fit.statistic
         new = refitted(bench, before, candidate.effect, after, noise, fit.parameters, beat)
         if new.excess > LEAVES * fit.excess:
             # the shapes of the model are those beside the named effect
             new = bench.refine(new.effects, noise, start=new.parameters)
         share = new.excess / max(fit.excess, 1.0)
-        if fit.statistic - new.statistic < better * new.unit:
-            continue
+        if fit.statistic - new.statistic < self.better * new.unit:
+            return None
         if share > LEAVES and lack_of_fit(bench, Settled(new, noise))[2] < LACK_LEVEL:
-            continue
+            return None
         if isinstance(candidate.effect, Creep) and not no_dry_friction(bench, new, position, noise):
-            continue
-        if best is None or share < best[0].share:
-            best = Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new.solution), new
-    return best
+            return None
+        own = fit.effects[position]
+        return Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new.solution)
 
 
 def _in_words(relative: Effect) -> str:

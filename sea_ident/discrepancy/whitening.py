@@ -95,10 +95,6 @@ class Whitening:
         """(M, ...) whitened real numbers from coefficients (H + 1, E, ...), without the samples that are left out."""
         return self.free.off(whiten(self.whitener, values))
 
-    def in_parts(self, values: ComplexArray) -> Parts:
-        """The same of coefficients (H + 1, E, k), in parts that add up."""
-        return self._in_parts([values])[0]
-
     def design(self, effects: Sequence[Effect]) -> Parts:
         """Columns of a model in parts."""
         signals = signal_effects(effects)
@@ -107,9 +103,10 @@ class Whitening:
         if missing and self._bytes > PARTS_KEPT:
             self._kept.clear()
             self._bytes, missing = 0, list(effects)
-        # together, for what is done to one column costs little more for many
-        found = self._in_parts([self._columns.columns_behind(effect, seen[effect]) for effect in missing])
-        for effect, parts in zip(missing, found, strict=True):
+        for effect in missing:
+            # one by one: the last digits of products depend on what is beside them, and an answer must not depend on
+            # what was computed before
+            parts = self.in_parts(self._columns.columns_behind(effect, seen[effect]))
             self._kept[effect, seen[effect]] = parts
             self._bytes += sum(block.rows.nbytes for block in parts.blocks)
         blocks: list[Block] = []
@@ -136,24 +133,23 @@ class Whitening:
     def _count(self) -> int:
         return int(self.parts.max()) + 1
 
-    def _in_parts(self, columns: Sequence[ComplexArray]) -> list[Parts]:
-        places: list[tuple[int, int, int, int]] = []
+    def in_parts(self, values: ComplexArray) -> Parts:
+        """Whitened columns from coefficients (H + 1, E, k), in parts that add up."""
+        places: list[tuple[int, int, int]] = []
         flat: list[FloatArray] = []
         for part in range(self._count):
             own = np.flatnonzero(self.parts == part)
-            spans = [_filled(values[:, own]) for values in columns]
-            chosen = [values[:, own, begin:end] for values, (begin, end) in zip(columns, spans, strict=True)]
-            if any(values.shape[2] for values in chosen):
-                flat.append(whiten(self.whitener[:, :, own], np.concatenate(chosen, axis=2)))
-                places.extend((k, part, begin, end) for k, (begin, end) in enumerate(spans) if end > begin)
-        blocks: list[list[Block]] = [[] for _ in columns]
+            begin, end = _filled(values[:, own])
+            if end > begin:
+                flat.append(whiten(self.whitener[:, :, own], values[:, own, begin:end]))
+                places.append((part, begin, end - begin))
+        blocks: list[Block] = []
         if flat:
             rows, taken = np.ascontiguousarray(self.free.off(np.concatenate(flat, axis=1)).T), 0
-            for k, part, begin, end in places:
-                blocks[k].append(Block(part, begin, rows[taken : taken + end - begin]))
-                taken += end - begin
-        shapes = [(self._count, self._length, values.shape[2]) for values in columns]
-        return [Parts(shape, tuple(found)) for shape, found in zip(shapes, blocks, strict=True)]
+            for part, begin, count in places:
+                blocks.append(Block(part, begin, rows[taken : taken + count]))
+                taken += count
+        return Parts((self._count, self._length, values.shape[2]), tuple(blocks))
 
 
 def _filled(values: ComplexArray) -> tuple[int, int]:
