@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import sea_ident
+from sea_ident import side_by_side
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording
 
@@ -57,6 +58,20 @@ def test_nothing_is_named_where_nothing_is_missing(intact, intact_model):
 def test_the_planted_effect_is_named_at_its_joint(found):
     assert found.verdict in ("named", "named_with_remainder")
     assert (found.missing[0].effect, found.missing[0].joint) == ("stribeck_friction", "knee")
+
+
+def test_a_second_core_changes_nothing(stribeck, stribeck_model, found, monkeypatch):
+    """Not a digit; and what is done is told once."""
+    training, holdout = stribeck
+    told = []
+    cores = side_by_side._cores()
+    monkeypatch.setattr(side_by_side, "_cores", lambda: 1 if cores > 1 else 2)
+    again = sea_ident.diagnose(
+        stribeck_model, training, holdout=holdout, progress=lambda what, share: told.append(share)
+    )
+    assert again.to_dict() == found.to_dict()
+    assert told == sorted(told)
+    assert told[-1] == 1.0
 
 
 def test_its_size_is_the_planted_one(found):
