@@ -213,8 +213,10 @@ class _Pair:
         for number in [each for each in self._received if each in numbers]:
             signed, payload = self._received.pop(number)
             if signed != sign:
+                self._received.clear()
                 self._go_alone()
-            elif payload is None:
+                return
+            if payload is None:
                 failed.add(number)
             elif number not in found:
                 found[number] = pickle.loads(payload)
@@ -253,7 +255,6 @@ class _Pair:
     def _go_alone(self) -> None:
         """Go on without the other process: it is gone, stands still, or goes another way."""
         self._lost = True
-        self._received.clear()
         if self._process is None:
             os._exit(0)
         self._process.kill()

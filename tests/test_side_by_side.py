@@ -236,6 +236,22 @@ def test_who_stops_asking_goes_on_in_step():
     assert all(len({worker for _, worker in each}) == 2 for each in after)
 
 
+def test_what_the_copy_did_ahead_is_taken_by_one_that_comes_late(monkeypatch):
+    monkeypatch.setattr(module, "LONGEST_WAIT", 5.0)
+    both = Both(where)
+
+    @shared
+    def late():
+        list(side_by_side(both, range(2)))
+        if not follows():
+            time.sleep(0.5)
+        return list(side_by_side(where, range(4)))
+
+    found = late()
+    assert [item for item, _ in found] == list(range(4))
+    assert os.getpid() not in {worker for _, worker in found}
+
+
 def test_work_within_the_turn_of_another_is_shared_too():
     @shared
     def interleaved():
