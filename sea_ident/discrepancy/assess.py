@@ -65,66 +65,51 @@ def rivals(bench: Bench, selection: Selection) -> dict[int, tuple[Alternative, .
     """
     now = selection.final
     positions = range(len(now.fit.effects) - selection.added, len(now.fit.effects))
-    return {
-        position: tuple(replace(each, fit=bench.again(solution, now.noise)) for each, solution in alike)
-        for position, alike in zip(positions, map(_Rivals(bench, now), positions), strict=True)
-    }
+    return {position: _alike(bench, now, position) for position in positions}
 
 
-@dataclass(frozen=True, eq=False)
-class _Rivals:
-    """Finds what does as well in the place of an effect.
-
-    Attributes:
-        bench: the recording.
-        now: the model.
-    """
-
-    bench: Bench
-    now: Settled
-
-    def __call__(self, position: int) -> list[tuple[Alternative, Solution]]:
-        """What does as well as the effect at a position, and the model with it."""
-        bench, fit, noise = self.bench, self.now.fit, self.now.noise
-        own = fit.effects[position]
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        reduced = bench.fit(others, noise, start=fit.parameters)
-        gain = reduced.statistic - fit.statistic
-        enough = no_worse(fit, gain)
-        reach = enough + EQUALLY_GOOD * fit.unit
-        alike: list[tuple[Alternative, Solution]] = []
-        dearer: list[tuple[Alternative, Solution, float]] = []
-        scores: list[float] = []
-        # wherever they act: of what the model absorbs but for a trace, that may be in the equations of other joints
-        scanned = scan(bench, reduced, noise)
-        tried = of_every_kind([c for c in scanned if c.key != effect_key(own)], RIVALS)
-        tried = [c for c in tried if not c.gain < 0.3 * gain]
-        in_place = _InPlace(bench, self.now, position, enough, reach)
-        for candidate, solution in zip(tried, side_by_side(in_place, tried), strict=True):
-            if solution is None:
-                continue
-            new = bench.again(solution, noise)
-            price = fit.unit * (penalty(new.effects[position], bench) - penalty(own, bench))
-            explained = reduced.whitened - fit.whitened
-            share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
-            other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0))
-            worse = new.statistic - fit.statistic
-            # what it saves by fewer parameters makes up for nothing that it explains less
-            behind = worse + max(price, 0.0)
-            if not worse < enough:
-                if behind < reach:
-                    alike.append((replace(other, behind=behind), solution))
-            # a play that is never closed is a constant: nothing but its size is fitted
-            elif worse + price < enough or never_closed(bench, new.effects, position):
-                alike.append((other, solution))
-                scores.append(new.statistic)
-            else:
-                dearer.append((other, solution, new.statistic))
-        # what this motion shows as exactly the same as one of them is as likely, however many parameters it has
-        for other, solution, score in dearer:
-            alike.append((replace(other, dearer=not any(abs(score - s) < THE_SAME for s in scores)), solution))
-        unique = {(a.effect, a.joint): (a, solution) for a, solution in sorted(alike, key=lambda x: _rank(x[0]))}
-        return sorted(unique.values(), key=lambda x: (not x[0].as_likely, -x[0].cos2))
+def _alike(bench: Bench, now: Settled, position: int) -> tuple[Alternative, ...]:
+    """What does as well as the effect at a position, each with its model."""
+    fit, noise = now.fit, now.noise
+    own = fit.effects[position]
+    others = [e for k, e in enumerate(fit.effects) if k != position]
+    reduced = bench.fit(others, noise, start=fit.parameters)
+    gain = reduced.statistic - fit.statistic
+    enough = no_worse(fit, gain)
+    reach = enough + EQUALLY_GOOD * fit.unit
+    alike: list[Alternative] = []
+    dearer: list[tuple[Alternative, float]] = []
+    scores: list[float] = []
+    # wherever they act: of what the model absorbs but for a trace, that may be in the equations of other joints
+    scanned = scan(bench, reduced, noise)
+    tried = of_every_kind([c for c in scanned if c.key != effect_key(own)], RIVALS)
+    tried = [c for c in tried if not c.gain < 0.3 * gain]
+    in_place = _InPlace(bench, now, position, enough, reach)
+    for candidate, solution in zip(tried, side_by_side(in_place, tried), strict=True):
+        if solution is None:
+            continue
+        new = bench.again(solution, noise)
+        price = fit.unit * (penalty(new.effects[position], bench) - penalty(own, bench))
+        explained = reduced.whitened - fit.whitened
+        share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
+        other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), fit=new)
+        worse = new.statistic - fit.statistic
+        # what it saves by fewer parameters makes up for nothing that it explains less
+        behind = worse + max(price, 0.0)
+        if not worse < enough:
+            if behind < reach:
+                alike.append(replace(other, behind=behind))
+        # a play that is never closed is a constant: nothing but its size is fitted
+        elif worse + price < enough or never_closed(bench, new.effects, position):
+            alike.append(other)
+            scores.append(new.statistic)
+        else:
+            dearer.append((other, new.statistic))
+    # what this motion shows as exactly the same as one of them is as likely, however many parameters it has
+    for other, score in dearer:
+        alike.append(replace(other, dearer=not any(abs(score - s) < THE_SAME for s in scores)))
+    unique = {(other.effect, other.joint): other for other in sorted(alike, key=_rank)}
+    return tuple(sorted(unique.values(), key=lambda other: (not other.as_likely, -other.cos2)))
 
 
 def _rank(other: Alternative) -> tuple[bool, float]:

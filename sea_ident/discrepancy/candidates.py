@@ -120,7 +120,7 @@ def scan(
     if instead_of is not None:
         effects = [effect for effect in effects if instead_of.concerns(bench.equations_of(effect))]
     found: list[Candidate] = []
-    for part, places in side_by_side(_Compared(bench, fit, left, model), bench.in_two(effects)):
+    for part, places in side_by_side(_Compared(bench, model), bench.in_two(effects)):
         bench.remember(places)
         found.extend(part)
     return sorted(found, key=lambda c: (-float(f"{c.gain:.9g}"), penalty(c.effect, bench)))
@@ -164,19 +164,15 @@ class _Compared:
 
     Attributes:
         bench: the recording.
-        fit: the model.
-        left: (M,) what it leaves, off all that is free.
-        model: the same in single precision.
+        model: the model.
     """
 
     bench: Bench
-    fit: Fit
-    left: FloatArray
-    model: "_Model"
+    model: _Model
 
     def __call__(self, effects: Sequence[Effect]) -> tuple[list[Candidate], Places]:
         """Those that can act here, each with its best shape, and where they act."""
-        bench, fit, left = self.bench, self.fit, self.left
+        bench, fit, left = self.bench, self.model.fit, self.model.left
         tried = [shown for effect in effects if (shown := _promising(bench, self.model, effect)) is not None]
         found: list[Candidate] = []
         for some in _chunks(tried):

@@ -50,8 +50,8 @@ class PeriodStates:
     bodies: FloatArray
 
 
-KeptPeriods: TypeAlias = dict[tuple[tuple[Effect, ...], int], PeriodStates]
-"""The mean (0) and some periods, by effects in the chain of signals and the first of them."""
+KeptPeriods: TypeAlias = dict[tuple[tuple[Effect, ...], range], PeriodStates]
+"""The mean (0) and some periods, by effects in the chain of signals and by which they are."""
 
 
 @dataclass(eq=False)

@@ -1,7 +1,7 @@
 """The periods of a recording in the light of a model."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -73,8 +73,7 @@ class Periods:
         """
         data = self.data
         # each process keeps the states of its half
-        halves = range(self._middle), range(self._middle, data.periods + 1)
-        model = np.concatenate(list(side_by_side(_Modelled(self, fit), halves)), axis=1)
+        model = np.concatenate(list(side_by_side(lambda half: self.torque(fit, half), self._halves)), axis=1)
         changes = (model[:, 1:] - model[:, :1]) * np.sqrt(data.periods)
         targets = np.stack([data.target(tau) for tau in data.period_tau_motor], axis=1)
         return targets - data.target(data.tau_motor)[:, None], changes
@@ -110,8 +109,7 @@ class Periods:
         """
         data, signals = self.data, signal_effects(fit.effects)
         bodies = tuple(e for e in fit.effects if e.name in BODIES)
-        halves = range(self._middle), range(self._middle, data.periods + 1)
-        states = [state for half in halves for state in self._states(moving(signals), bodies, half).each]
+        states = [state for half in self._halves for state in self._states(moving(signals), bodies, half).each]
         torques = [
             data.tau_motor,
             *(data.tau_motor + (tau - data.tau_motor) / np.sqrt(data.periods) for tau in data.period_tau_motor),
@@ -126,14 +124,15 @@ class Periods:
         return np.asarray((np.stack(found[1:]) - found[0]) * np.sqrt(data.periods), dtype=np.complex128)
 
     @property
-    def _middle(self) -> int:
-        """Number of the mean and the first periods: half of all."""
-        return self.data.periods // 2 + 1
+    def _halves(self) -> tuple[range, range]:
+        """The mean (0) and the first periods, and the others."""
+        middle = self.data.periods // 2 + 1
+        return range(middle), range(middle, self.data.periods + 1)
 
     def _states(self, signals: tuple[Effect, ...], bodies: tuple[Effect, ...], which: range) -> PeriodStates:
         """The mean (0) and periods (from 1 on) behind effects in the chain of signals."""
         signals = nearly(signals, AMOUNT_DIGITS)
-        if (signals, which.start) not in self._kept:
+        if (signals, which) not in self._kept:
             if len(self._kept) > STATES_KEPT:
                 self._kept.clear()
             mean, data = self.data.motion, self.data
@@ -147,29 +146,12 @@ class Periods:
             rows = [np.concatenate([part.link, part.motor], axis=1) for part in parts]
             nothing = np.zeros((len(joined.motion), 2 * self.robot.n, 0))
             # other states than those of the bodies, for these keep their regressor
-            self._kept[signals, which.start] = PeriodStates(
+            self._kept[signals, which] = PeriodStates(
                 tuple(State(self.robot, motion, channels) for motion in thin),
                 State(self.robot, joined.motion, many),
                 np.concatenate([nothing, *rows], axis=2),
             )
-        return self._kept[signals, which.start]
-
-
-@dataclass(frozen=True, eq=False)
-class _Modelled:
-    """Evaluates a model on periods.
-
-    Attributes:
-        periods: the recording.
-        fit: the model.
-    """
-
-    periods: Periods
-    fit: Fit
-
-    def __call__(self, which: range) -> FloatArray:
-        """(N', S, E) torque of the model in the mean (0) and in periods (from 1 on)."""
-        return self.periods.torque(self.fit, which)
+        return self._kept[signals, which]
 
 
 def _pieces(states: PeriodStates) -> list[tuple[slice, State]]:

@@ -124,7 +124,7 @@ def unnamed(
         return best[0] if best is not None and _holds(best[1], selection, held, position) else None
 
     positions = range(len(now.fit.effects) - selection.added, len(now.fit.effects))
-    return (*pairs, *(found for found in map(in_place_of, positions) if found is not None))
+    return (*pairs, *(found for position in positions if (found := in_place_of(position)) is not None))
 
 
 def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut | None) -> tuple[Unnamed, ...]:

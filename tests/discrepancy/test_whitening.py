@@ -8,6 +8,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, spectrum, wide_processing
 from sea_ident.discrepancy.diagnose import model_effects
 from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.whitening import Whitening
 
 PERIOD = 5.0
 
@@ -47,6 +48,16 @@ def test_columns_of_a_model_are_those_of_its_effects_in_their_order(settled):
     values = rng.standard_normal(expected.shape[1])
     torque = whitening.factors(scale) @ (parts @ values)
     np.testing.assert_allclose(torque, expected @ values, atol=1e-9 * np.abs(expected @ values).max())
+
+
+def test_no_digit_depends_on_what_was_asked_for_before(settled):
+    """Two processes that were asked for different things have to say the same of a model."""
+    bench, now = settled
+    whole, single = (Whitening(bench, now.noise.whitener(), bench._free) for _ in range(2))
+    for effect in now.fit.effects:
+        single.design([effect])
+    parts = [each.design(now.fit.effects).scaled(each.factors(now.fit.scale)) for each in (whole, single)]
+    np.testing.assert_array_equal(parts[0], parts[1])
 
 
 def test_a_fit_says_the_same_of_its_residual_as_a_plain_projection(settled):
