@@ -32,7 +32,10 @@ from sea_ident.effects.drift import TrendEffect
 from sea_ident.side_by_side import side_by_side
 
 SURE = 3.0
-"""Standard deviations by which a value of a trend that bends must differ from zero, its course free [-]."""
+"""Standard deviations by which a value of a trend that is over soon must differ from zero, its course free [-], ..."""
+
+NOT_AT_ALL = 1.0
+"""... and of any other: a rate that may as well be none is not told, whatever the course explains [-]."""
 
 LEVEL = 1e-4
 """Probability that a trend must have by chance at most to be one. The scatter of periods is no normal distribution far
@@ -94,10 +97,9 @@ class Trend:
     alternatives: tuple[tuple[Effect, float], ...] = ()
     time_constant_std: float = 0.0
 
-    @property
-    def known(self) -> bool:
-        """Whether any value is known well enough to be there: what is over within a period or two tells no rate."""
-        return bool(np.any(np.abs(self.values) > SURE * self.stds))
+    def known(self, deviations: float) -> bool:
+        """Whether any value differs from zero by so many of its standard deviations."""
+        return bool(np.any(np.abs(self.values) > deviations * self.stds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,10 +196,13 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value
     trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
-    short = [_is_over_soon(bench, c.direction) and not trend.known for c, trend in zip(chosen, trends, strict=True)]
-    if any(short):
-        notes += tuple(_over_too_soon(bench, trend) for trend, over in zip(trends, short, strict=True) if over)
-        chosen = [c for c, over in zip(chosen, short, strict=True) if not over]
+    soon = [_is_over_soon(bench, c.direction) for c in chosen]
+    told = [trend.known(SURE if over else NOT_AT_ALL) for trend, over in zip(trends, soon, strict=True)]
+    if not all(told):
+        notes += tuple(
+            _not_told(bench, trend, over) for trend, over, known in zip(trends, soon, told, strict=True) if not known
+        )
+        chosen = [c for c, known in zip(chosen, told, strict=True) if known]
         trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
@@ -293,8 +298,13 @@ def _is_over_soon(bench: Bench, direction: Direction) -> bool:
     return direction.bent and constant < SOON * bench.data.period
 
 
-def _over_too_soon(bench: Bench, trend: Trend) -> str:
+def _not_told(bench: Bench, trend: Trend, over_soon: bool) -> str:
     effect = trend.effect
+    if not over_soon:
+        return (
+            f"{bench.data.source}: the periods differ a little as {effect.title} would make them, but its rate is "
+            "known no better than to its own size: it is not named. Record more periods"
+        )
     return (
         f"{bench.data.source}: the first periods differ as {effect.title} would make them, but it is over so soon "
         f"(within about {getattr(effect, 'time_constant', 0.0):.2g} s) that its rate is not known: it is not named. "

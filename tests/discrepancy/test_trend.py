@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import check
+from sea_ident.discrepancy import trend as trend_module
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.settle import settle
@@ -309,13 +310,34 @@ def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_c
     assert any("torque_constant_drift at hip" in note and "over so soon" in note for note in found.notes) is not named
 
 
+@pytest.mark.scenario
+@pytest.mark.parametrize(("deviations", "named"), [(0.9, False), (1.1, True)])
+def test_a_rate_within_its_own_deviation_is_not_told(laboratory, monkeypatch, deviations, named):
+    """Periods that differ as a drift makes them, p 1e-4, with a rate of -0.006 +- 0.007 1/min: nothing to name."""
+    planted = [("torque_constant_drift", "hip", [0.1], {"time_constant": 1e4})]
+    bench = laboratory.bench(laboratory.record(planted, periods=10))
+    now = settle(bench, bench.effects)
+
+    def less_sure(*given):
+        told = whole(*given)
+        return replace(told, stds=np.abs(told.values) / deviations)
+
+    whole = trend_module._trend
+    monkeypatch.setattr(trend_module, "_trend", less_sure)
+    found = compare_periods(bench, now.fit)
+    assert found.p_value < 1e-3
+    assert [(t.effect.name, t.effect.joint) for t in found.trends] == [("torque_constant_drift", "hip")] * named
+    notes = [note for note in found.notes if "torque_constant_drift at hip" in note and "Record more periods" in note]
+    assert len(notes) == (not named)
+
+
 @pytest.mark.parametrize(
     ("time_constant", "bent", "soon"), [(9.9, True, True), (10.1, True, False), (9.9, False, False)]
 )
 def test_a_drift_is_over_soon_where_its_time_constant_is_that_of_a_period_or_two(
     nothing_missing, time_constant, bent, soon
 ):
-    """What goes on for longer has a name, however uncertain its rate."""
+    """What goes on for longer has a name where its rate is known a little."""
     bench, _ = nothing_missing
     assert bench.data.period == pytest.approx(5.0)
     drift = make_effect("friction_drift", "hip", time_constant=time_constant)
