@@ -176,7 +176,7 @@ class Columns:
             rows = [equation_row(equation, part) for part in parts]
             if any(np.any(row) for row in rows):
                 touched.append(e)
-                found.append(np.stack(rows, axis=1))
+                found.append(np.stack(rows, axis=1) if len(rows) > 1 else rows[0][:, None])
         shape = (self.data.samples, 0, len(parts), *parts[0].link.shape[2:])
         every = np.stack(found, axis=1) if found else np.zeros(shape)
         return np.array(touched, dtype=np.intp), spectrum(every, self.data.harmonics)

@@ -167,9 +167,10 @@ class Tangents(Columns):
                 own = np.array([parameters.get(c.name, 0.0) for c in e.columns(self.robot)])
                 if np.any(own):
                     part = e.evaluate(state)
-                    total += np.stack([part.link @ own, part.motor @ own])
-                    if e.side is Side.SPRING:
-                        spring += np.stack([part.link @ own, part.motor @ own])
+                    for side, acts in enumerate((part.link @ own, part.motor @ own)):
+                        total[side] += acts
+                        if e.side is Side.SPRING:
+                            spring[side] += acts
             rows.append(total)
             springs.append(spring)
         change = (rows[1] - rows[0]) / (2.0 * step)

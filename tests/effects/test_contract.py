@@ -196,6 +196,23 @@ def test_a_sensor_effect_changes_what_is_seen_and_can_be_taken_out(name, leg):
         np.testing.assert_allclose(again.q[20:-20], motion.q[20:-20], atol=2e-4)
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-4, 0.2])
+def test_an_error_once_per_turn_is_taken_out_to_the_last_digit(leg, size):
+    """Up to the ends of its range, with the rates of what is shown by the chain rule."""
+    motion = smooth_motion(leg)
+    effect = make_effect("encoder_eccentricity", "knee", sine=size, cosine=-size)
+    q, dq, ddq = (each[:, 1] for each in (motion.q, motion.dq, motion.ddq))
+    slope, bend = 1.0 + size * (np.cos(q) + np.sin(q)), size * (np.cos(q) - np.sin(q))
+    shown, rate, acceleration = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+    shown[:, 1] = q + size * (np.sin(q) - np.cos(q))
+    rate[:, 1] = slope * dq
+    acceleration[:, 1] = slope * ddq + bend * dq**2
+    again = effect.corrected(leg, replace(motion, q=shown, dq=rate, ddq=acceleration))
+    np.testing.assert_allclose(again.q, motion.q, rtol=0.0, atol=1e-14 * (1.0 + np.abs(q).max()))
+    np.testing.assert_allclose(again.dq, motion.dq, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(again.ddq, motion.ddq, rtol=1e-12, atol=1e-12 * (1.0 + np.abs(ddq).max()))
+
+
 @pytest.mark.parametrize("way", [1, -1])
 def test_an_encoder_errs_before_the_link_bends_behind_it(leg, way):
     """In whatever order a model lists them: else the error would count as a deflection, and bend the link."""
