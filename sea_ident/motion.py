@@ -69,6 +69,11 @@ class Motion:
             self.theta[rows], self.dtheta[rows], self.ddtheta[rows],
         )  # fmt: skip
 
+    def plus(self, errors: FloatArray) -> "Motion":
+        """The motion with errors (6, N, n) of q, q', q'', theta, theta', theta'' added."""
+        parts = (self.q, self.dq, self.ddq, self.theta, self.dtheta, self.ddtheta)
+        return Motion(self.time, *(part + error for part, error in zip(parts, errors, strict=True)))
+
     def chunks(self, size: int) -> Iterator["Motion"]:
         """Consecutive parts of at most `size` samples."""
         for start in range(0, len(self), size):

@@ -25,13 +25,22 @@ from sea_ident.discrepancy.noise import (
     step_freedom,
 )
 from sea_ident.discrepancy.parameter_fits import ParameterFits
-from sea_ident.discrepancy.periods import Periods
+from sea_ident.discrepancy.periods import Periods, with_other_steps
 from sea_ident.discrepancy.whitening import Whitening
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 
-EVALUATED_ON = ("robot", "motion", "period_motions", "channels", "equations", "tau_motor", "period_tau_motor")
+EVALUATED_ON = (
+    "robot",
+    "motion",
+    "period_motions",
+    "channels",
+    "equations",
+    "tau_motor",
+    "period_tau_motor",
+    "step_errors",
+)
 """What of a recording effects are evaluated on."""
 
 NOISE_ROUNDS = 2
@@ -89,6 +98,8 @@ class Bench(ParameterFits):
     def __init__(self, data: PeriodData, effects: Sequence[Effect], evaluated: Evaluated | None = None) -> None:
         super().__init__(data, effects, evaluated)
         self._periods = Periods(data, self._evaluated.periods)
+        disturbed = with_other_steps(data)
+        self._other_steps = None if disturbed is None else Periods(disturbed, self._evaluated.steps)
 
     def comparing(self, data: PeriodData) -> "Bench":
         """The same model and recording on another bench that compares other samples, or knows more of it.
@@ -224,9 +235,12 @@ class Bench(ParameterFits):
         return np.asarray(self._periods.column_changes(effect, fit) * fit.scale[:, None], dtype=np.complex128)
 
     def noise(self, fit: Fit) -> NoiseFloor:
-        """Noise floor of the mean with the parameters of a fit."""
+        """Noise floor of the mean with the parameters of a fit, and what steps of encoders do to every period alike."""
         steps = self.period_steps(fit)
-        return self._noise(fit, steps, self.data.averaged, closed_freedom_of_many(len(steps)))
+        floor = self._noise(fit, steps, self.data.averaged, closed_freedom_of_many(len(steps)))
+        if self._other_steps is None:
+            return floor
+        return floor.beside(self._other_steps.residuals(fit) - fit.scale * fit.residual)
 
     def noise_of_cut(self, fit: Fit) -> NoiseFloor:
         """The same by periods as they are cut, which do not close: to compare these with one another."""

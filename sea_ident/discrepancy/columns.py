@@ -67,6 +67,7 @@ class Evaluated:
         variants: equations (e,) and columns (H + 1, e, v, k) of an effect in several shapes.
         deflections: spectra (H,) of every link equation behind effects in the chain of signals.
         periods: the mean and the periods.
+        steps: the mean, and what it would be with steps of encoders that lie elsewhere.
     """
 
     states: dict[tuple[Effect, ...], State] = field(default_factory=dict)
@@ -79,6 +80,7 @@ class Evaluated:
     )
     deflections: dict[tuple[Effect, ...], dict[int, ComplexArray]] = field(default_factory=dict)
     periods: KeptPeriods = field(default_factory=dict)
+    steps: KeptPeriods = field(default_factory=dict)
 
 
 class Columns:

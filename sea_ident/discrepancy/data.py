@@ -45,6 +45,11 @@ SLOWEST = 0.02
 UNCERTAIN_SIGN = 2.0
 """Samples slower than this many times their scatter from period to period are left out too: a mean of signs is none."""
 
+STEP_DRAWS = 8
+"""Other places of the steps of encoders that repeat in every period, for what they do to a torque."""
+
+STEP_SEED = 1
+
 ALIKE = 0.1
 """Combinations of samples left out that are weaker than this within the band are not freed, so that the width of a
 sliding start of friction and what friction remembers of a reversal stay visible, ..."""
@@ -99,6 +104,8 @@ class PeriodData:
         alike: combinations of samples left out that are weaker than this within the band are not freed [-].
         known: (N, E) torque that is known to act beside the model, None where there is none [N m].
         places: (P,) number of every period in the recording, from 0, where some were left out; else nothing.
+        step_errors: (K, 6, N, n) errors of the mean motion (q, q', q'', theta, theta', theta'') by steps of encoders
+            that lie elsewhere, where these repeat in every period; None where they average out.
     """
 
     robot: Robot
@@ -118,6 +125,7 @@ class PeriodData:
     alike: float = ALIKE
     known: FloatArray | None = None
     places: tuple[int, ...] = ()
+    step_errors: FloatArray | None = None
 
     @property
     def starts(self) -> FloatArray:
@@ -269,6 +277,7 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         harmonics_for(processed.period, processed.samples, len(equations_of(robot))),
         max(int(least / REGRESSOR_MARGIN), 1),
     )
+    errors = _step_errors(processed, motion, processed.period)
     return PeriodData(
         robot=robot,
         source=processed.source,
@@ -281,16 +290,28 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         equations=equations_of(robot),
         harmonics=harmonics,
         reach=max(processed.link_harmonics, processed.motor_harmonics),
-        left_out=around_reversals(motion, equations_of(robot), processed.period_motions),
+        left_out=around_reversals(motion, equations_of(robot), processed.period_motions, errors),
         warnings=processed.warnings,
         places=processed.places,
+        step_errors=errors,
     )
+
+
+def _step_errors(processed: ProcessedRecording, motion: Motion, period: float) -> FloatArray | None:
+    """(K, 6, N, n) errors of the mean motion by steps of its encoders that lie elsewhere, where these repeat."""
+    steps = processed.encoder_steps
+    if steps is None:
+        return None
+    rng = np.random.default_rng(STEP_SEED)
+    harmonics = processed.link_harmonics, processed.motor_harmonics
+    return np.stack([steps.another(motion, period, harmonics, rng) for _ in range(STEP_DRAWS)])
 
 
 def around_reversals(
     motion: Motion,
     equations: tuple[Equation, ...],
     periods: tuple[Motion, ...] = (),
+    errors: FloatArray | None = None,
     *,
     samples: int = REVERSAL_SAMPLES,
     uncertain: float = UNCERTAIN_SIGN,
@@ -299,6 +320,14 @@ def around_reversals(
 
     There a sample falls on one or the other side of a jump (of friction, of the efficiency of the gear) by a velocity
     that is known no better than to its sign: no model of the mean can be right.
+
+    Args:
+        motion: (N, n) mean motion.
+        equations: E.
+        periods: motions of the periods, whose scatter blurs the sign of a speed, ...
+        errors: ... and errors (K, 6, N, n) of the mean that are in all of them.
+        samples: left out to either side of a reversal.
+        uncertain: times that a speed must exceed its scatter [-].
     """
     left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):
@@ -307,6 +336,9 @@ def around_reversals(
         left_out[:, e] = around_reversal(speed, samples)
         if len(periods) > 1:
             spread = np.std([getattr(period, kind)[:, equation.index] for period in periods], axis=0, ddof=1)
+            if errors is not None:
+                repeated = errors[:, SIGNALS.index(kind), :, equation.index]
+                spread = np.hypot(spread, np.sqrt(np.mean(repeated**2)))
             left_out[:, e] |= np.abs(speed) < uncertain * spread
     return left_out
 
@@ -334,6 +366,7 @@ def away_from_reversals(data: PeriodData, caution: int = 2) -> PeriodData:
         data.motion,
         data.equations,
         data.period_motions,
+        data.step_errors,
         samples=caution * REVERSAL_SAMPLES,
         uncertain=caution * UNCERTAIN_SIGN,
     )

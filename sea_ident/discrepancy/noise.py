@@ -84,6 +84,20 @@ class NoiseFloor:
         """
         return min(max(self.freedom - self.equations, 1.0) / self.freedom, 1.0)
 
+    def beside(self, errors: ComplexArray) -> "NoiseFloor":
+        """The floor with an error of the mean in it that no scatter shows.
+
+        Args:
+            errors: (K, H + 1, E) some such errors [N m].
+        """
+        products = np.einsum("pke,pkf->kef", errors, errors.conj()) / len(errors)
+        products[1:] /= 2.0
+        products[0] = products[0].real
+        half = min(SMALLEST_HALF_WIDTH, max((len(products) - 1) // 2, 1))
+        more = _moving_mean(products, half)
+        more[0] = more[0].real
+        return replace(self, covariance=self.covariance + more)
+
     def whitener(self) -> ComplexArray:
         """(H + 1, E, E) lower triangles that turn the mean residual into unit-variance numbers."""
         count = self.equations

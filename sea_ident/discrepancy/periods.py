@@ -33,6 +33,22 @@ STATES_KEPT = 6
 """Halves of the periods, each behind other effects in the chain of signals, that are kept."""
 
 
+def with_other_steps(data: PeriodData) -> PeriodData | None:
+    """A recording whose periods are its mean with steps of the encoders that lie elsewhere; None where they average out.
+
+    What these periods differ by is what such steps do to a torque, and are the same in every period of the recording.
+    """
+    if data.step_errors is None:
+        return None
+    return replace(
+        data,
+        period_motions=tuple(data.motion.plus(errors) for errors in data.step_errors),
+        period_tau_motor=np.stack([data.tau_motor] * len(data.step_errors)),
+        places=(),
+        step_errors=None,
+    )
+
+
 class Periods:
     """Evaluates models on every period; what was computed once is kept.
 

@@ -12,7 +12,6 @@ from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm
 from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty
-from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.harmonics import FEWEST_PERIODS
 
@@ -125,17 +124,12 @@ def _with_error(processed: ProcessedRecording, period: float, rng: np.random.Gen
     steps = processed.encoder_steps
     if steps is None:
         return processed
-    link, motor = steps.another(processed.motion, period, (processed.link_harmonics, processed.motor_harmonics), rng)
+    errors = steps.another(processed.motion, period, (processed.link_harmonics, processed.motor_harmonics), rng)
     return replace(
         processed,
-        motion=_moved(processed.motion, link, motor),
-        period_motions=tuple(_moved(motion, link, motor) for motion in processed.period_motions),
+        motion=processed.motion.plus(errors),
+        period_motions=tuple(motion.plus(errors) for motion in processed.period_motions),
     )
-
-
-def _moved(motion: Motion, link: tuple[FloatArray, ...], motor: tuple[FloatArray, ...]) -> Motion:
-    parts = (motion.q, motion.dq, motion.ddq, motion.theta, motion.dtheta, motion.ddtheta)
-    return Motion(motion.time, *(part + error for part, error in zip(parts, (*link, *motor), strict=True)))
 
 
 def _law(spring: SpringResult) -> FloatArray:

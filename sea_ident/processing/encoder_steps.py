@@ -67,7 +67,7 @@ class EncoderSteps:
 
     def another(
         self, motion: Motion, period: float, harmonics: tuple[int, int], rng: np.random.Generator
-    ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+    ) -> FloatArray:
         """An error of the mean motion as these encoders make it when their steps lie elsewhere.
 
         Args:
@@ -77,13 +77,13 @@ class EncoderSteps:
             rng: draws where the steps lie.
 
         Returns:
-            Errors of q, q', q'' and of theta, theta', theta'', each (N, n).
+            (6, N, n) errors of q, q', q'', theta, theta', theta''.
         """
         link = _errors(motion.q, self.link, self.link_error, rng)
         motor = link.copy()
         own = _errors(motion.theta, self.motor, self.motor_error, rng)
         motor[:, self.elastic] = own[:, self.elastic]
-        return differentiate(link, period, harmonics[0]), differentiate(motor, period, harmonics[1])
+        return np.stack([*differentiate(link, period, harmonics[0]), *differentiate(motor, period, harmonics[1])])
 
 
 def _errors(values: FloatArray, steps: FloatArray, errors: FloatArray, rng: np.random.Generator) -> FloatArray:

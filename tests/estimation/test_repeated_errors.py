@@ -86,8 +86,8 @@ def test_a_rigid_joint_has_one_encoder():
     steps = processed.encoder_steps
     assert np.all(steps.link_error > 0.0)
     assert "theta" not in steps.words(robot.joint_names)
-    link, motor = steps.another(processed.motion, 10.0, (20, 20), np.random.default_rng(0))
-    for own, other in zip(link, motor, strict=True):
+    errors = steps.another(processed.motion, 10.0, (20, 20), np.random.default_rng(0))
+    for own, other in zip(errors[:3], errors[3:], strict=True):
         np.testing.assert_array_equal(own, other)
     model = identify(robot, processed)
     told = [text for text in model.warnings if "larger than its noise" in text]
