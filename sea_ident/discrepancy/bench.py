@@ -14,8 +14,9 @@ from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes, moved, room
-from sea_ident.discrepancy.linear import off, span
+from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import (
+    REPEATED_VARIANCE,
     ComplexArray,
     NoiseFloor,
     closed_freedom_of_many,
@@ -238,9 +239,19 @@ class Bench(ParameterFits):
         """Noise floor of the mean with the parameters of a fit, and what steps of encoders do to every period alike."""
         steps = self.period_steps(fit)
         floor = self._noise(fit, steps, self.data.averaged, closed_freedom_of_many(len(steps)))
+        return floor if self._other_steps is None else floor.beside(self._step_errors(fit, self._other_steps))
+
+    def share_of_steps(self, fit: Fit, noise: NoiseFloor) -> float:
+        """Share of a noise floor that steps of encoders make up, which repeat in every period [-]."""
         if self._other_steps is None:
-            return floor
-        return floor.beside(self._other_steps.residuals(fit) - fit.scale * fit.residual)
+            return 0.0
+        errors = self._step_errors(fit, self._other_steps)
+        whitened = np.stack([whiten(noise.whitener(), error) for error in errors])
+        return float(REPEATED_VARIANCE * np.mean(whitened**2))
+
+    def _step_errors(self, fit: Fit, others: Periods) -> ComplexArray:
+        """(K, H + 1, E) what the residual of a fit changes by where the steps of encoders lie elsewhere."""
+        return np.asarray(others.residuals(fit) - fit.scale * fit.residual, dtype=np.complex128)
 
     def noise_of_cut(self, fit: Fit) -> NoiseFloor:
         """The same by periods as they are cut, which do not close: to compare these with one another."""

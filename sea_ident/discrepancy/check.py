@@ -40,11 +40,13 @@ class Findings:
         warnings: what a user should know.
         fatal: whether no conclusion can be drawn.
         doubtful: whether the positions may not be those of the model, so that a disagreement proves nothing.
+        limited: whether what has no name may be what the sensors cannot show.
     """
 
     warnings: tuple[str, ...] = ()
     fatal: bool = False
     doubtful: bool = False
+    limited: bool = False
 
 
 def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float]) -> Findings:

@@ -125,6 +125,8 @@ def conclude(
     doubted = notes.doubtful and verdict is not Verdict.NONE
     if doubted:
         verdict, lost, remainder = Verdict.CANNOT_TELL, True, 0.0
+    if notes.limited and verdict is Verdict.NOT_IN_LIBRARY:
+        verdict = Verdict.CANNOT_TELL
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     without_doubt = (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS)

@@ -228,7 +228,7 @@ def wide_processing(
     least = int(REGRESSOR_MARGIN * compared)
     most = max(min(int(WIDEST_MARGIN * compared), int(_most(first.samples))), least)
     wide = process(recording, robot, period=first.period, link_harmonics=most, motor_harmonics=most)
-    blurred = _blur(wide.period_motions)
+    blurred = _blur(wide)
     if blurred <= 1.0 or most == least:
         return wide
     # the power of white noise in a velocity grows with the third power of the bandwidth
@@ -242,14 +242,20 @@ def scatter_of_passes(passes: FloatArray) -> FloatArray:
     return scatter
 
 
-def _blur(motions: Sequence[Motion]) -> float:
-    """Largest scatter of a velocity between periods, in units of what may be uncertain of its sign [-]."""
-    if len(motions) < 2:
+def _blur(processed: ProcessedRecording) -> float:
+    """Largest error of a velocity in a period, in units of what may be uncertain of its sign [-].
+
+    What it scatters by between periods, and what steps of encoders do to it in every period alike.
+    """
+    motions = processed.period_motions
+    if len(motions) < 2 or processed.period is None:
         return 1.0
-    largest = 0.0
+    largest, errors = 0.0, _step_errors(processed, processed.motion, processed.period)
     for name in ("dq", "dtheta"):
         speeds = np.stack([getattr(motion, name) for motion in motions])
         scatter = scatter_of_passes(speeds)
+        if errors is not None:
+            scatter = np.hypot(scatter, np.sqrt(np.mean(errors[:, SIGNALS.index(name)] ** 2, axis=(0, 1))))
         rms = np.sqrt(np.mean(speeds**2, axis=(0, 1)))
         moving = rms > 0.0
         largest = max(largest, float(np.max(UNCERTAIN_SIGN * scatter[moving] / (SLOWEST * rms[moving]), initial=0.0)))

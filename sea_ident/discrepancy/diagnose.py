@@ -32,6 +32,7 @@ from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, still_needed, without
+from sea_ident.discrepancy.sensor_limits import limits, steps_cover
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
@@ -125,7 +126,7 @@ def diagnose(
     basic = completed(bench)
     if basic is not None:
         found = _compared(bench, confirm(bench, basic.selection), temperature)
-    elif data.periods < FEWEST_TO_SEARCH or misplaced is not None:
+    elif data.periods < FEWEST_TO_SEARCH or misplaced is not None or _in_steps(bench):
         found = _compared(bench, confirm(bench, _unsearched(bench)), temperature)
     else:
         found = _searched(bench, temperature, tell)
@@ -152,8 +153,18 @@ def diagnose(
     forward = _forward(others[0] if others else None, repaired, held, recording, processed, controller)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
     basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *forward.notes)
-    notes = replace(notes, warnings=said)
+    open_by_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
+    said = (
+        *notes.warnings,
+        *open_by_sensors,
+        *found.notes,
+        *basic_notes,
+        *spoken,
+        *held_notes,
+        *change_notes,
+        *forward.notes,
+    )
+    notes = replace(notes, warnings=said, limited=limited)
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
@@ -317,6 +328,11 @@ def _at_rest(selection: Selection, held: HeldOut | None) -> tuple[str, ...]:
     """Where the dry friction of springs rests, in words."""
     constants = (selection.effects[k] for k in resting(selection, held))
     return tuple(words.at_rest(effect.required_joint) for effect in constants if isinstance(effect, SpringOffset))
+
+
+def _in_steps(bench: Bench) -> bool:
+    """Whether nothing is to be searched for: the steps of the encoders may be all that is left."""
+    return bench.data.step_errors is not None and steps_cover(bench, settle(bench, bench.effects))
 
 
 def _unsearched(bench: Bench) -> Selection:

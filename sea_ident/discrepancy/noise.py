@@ -43,6 +43,9 @@ FEWEST_CLOSED_PAIRS = 15
 FILLED_CLOSED = 0.4
 """... and the share where there are fewer: twenty periods of legs fill 0.4 to 0.9 of them."""
 
+REPEATED_VARIANCE = 2.0
+"""How many times the variance that it is estimated to have an error counts with which no scatter shows [-]."""
+
 SMALLEST_REST = 0.1
 """A residual of which a model takes up more than all but this share says nothing about noise."""
 
@@ -90,7 +93,7 @@ class NoiseFloor:
         Args:
             errors: (K, H + 1, E) some such errors [N m].
         """
-        products = np.einsum("pke,pkf->kef", errors, errors.conj()) / len(errors)
+        products = REPEATED_VARIANCE * np.einsum("pke,pkf->kef", errors, errors.conj()) / len(errors)
         products[1:] /= 2.0
         products[0] = products[0].real
         half = min(SMALLEST_HALF_WIDTH, max((len(products) - 1) // 2, 1))

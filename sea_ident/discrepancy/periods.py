@@ -34,7 +34,7 @@ STATES_KEPT = 6
 
 
 def with_other_steps(data: PeriodData) -> PeriodData | None:
-    """A recording whose periods are its mean with steps of the encoders that lie elsewhere; None where they average out.
+    """Its mean with steps of the encoders that lie elsewhere, as periods of a recording; None where they average out.
 
     What these periods differ by is what such steps do to a torque, and are the same in every period of the recording.
     """

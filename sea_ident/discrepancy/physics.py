@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import at_a_bound
+from sea_ident.discrepancy.judge import at_a_bound, own_torque
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
@@ -19,6 +19,10 @@ from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
+
+LARGEST_OF_A_SENSOR = 20.0
+"""Times the torque that an error of a sensor may change it by: more it does only through a spring that hardly moves,
+whose stiffness comes out as anything [-]."""
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
@@ -196,7 +200,7 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
     effect = fit.effects[position]
     columns, values = effect.columns(bench.robot), fit.values[_own(bench, fit, position)]
     if not columns:
-        return True
+        return own_torque(bench, fit, position) < LARGEST_OF_A_SENSOR
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
         return False
     if isinstance(effect, NonlinearViscousFriction) and at_a_bound(effect):

@@ -19,6 +19,13 @@ misfit, ..."""
 BENT = 0.7
 """... unless that leaves less than this share of the excess: then they were what is wrong, ..."""
 
+MORE_ROUNDS = 8
+"""Rounds more that a noise floor and a fit may take where steps of encoders, which a fit weighs by its inertias, make
+up most of the floor, ..."""
+
+CONSISTENT = 1.1
+"""... until the floor has about what the fit makes of these steps: their share of it cannot be more than one [-]."""
+
 COMMON = 2.5
 """... or they change by less than this factor: as much as one motor may differ from another."""
 
@@ -41,6 +48,10 @@ def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
     fit = bench.first_fit if tuple(effects) == bench.effects else bench.fit(effects, None, tangents=False)
     settled = Settled(fit, bench.noise(fit))
     for _ in range(rounds):
+        settled = settle_again(bench, settled.fit)
+    for _ in range(MORE_ROUNDS):
+        if bench.share_of_steps(settled.fit, settled.noise) <= CONSISTENT:
+            break
         settled = settle_again(bench, settled.fit)
     slack = bench.slack_links(settled.fit)
     if slack:
