@@ -1,0 +1,74 @@
+"""Where the sensors of a robot, and not a missing effect, may be what a model disagrees with."""
+
+import numpy as np
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import PeriodData
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.settle import Settled
+from sea_ident.processing.encoder_steps import EncoderSteps
+
+MOST = 0.5
+"""Share of the noise floor that steps of encoders make up from which on nothing is told of what they can explain."""
+
+WORTH_A_WORD = 0.1
+"""And the share from which on a user is told."""
+
+HARDLY = 5.0
+"""Times its noise that a deflection must change by (rms) for the torque of its spring to be known."""
+
+
+def steps_cover(bench: Bench, settled: Settled) -> bool:
+    """Whether all that a model leaves may be what steps of encoders do to every period alike.
+
+    They are no noise: their form follows the motion, and an effect of nearly that form can be far beyond what is
+    usual by chance.
+
+    Args:
+        bench: the recording.
+        settled: the model and its noise floor.
+    """
+    if bench.share_of_steps(settled.fit, settled.noise) <= MOST:
+        return False
+    return lack_of_fit(bench, settled)[2] >= LACK_LEVEL
+
+
+def limits(bench: Bench, settled: Settled, steps: EncoderSteps | None) -> tuple[tuple[str, ...], bool]:
+    """What the sensors leave open.
+
+    Args:
+        bench: the recording.
+        settled: the model and its noise floor.
+        steps: steps of encoders that do not average out.
+
+    Returns:
+        What a user should know, and whether what has no name may be that.
+    """
+    found: list[str] = []
+    share = bench.share_of_steps(settled.fit, settled.noise)
+    if steps is not None and share > WORTH_A_WORD:
+        found.append(
+            f"{bench.data.source}: encoder steps do not average out, as they repeat in every period: "
+            f"{steps.words(bench.robot.joint_names)}. What they may do to the torques counts as noise and is "
+            f"{100.0 * min(share, 1.0):.0f} % of it; smaller effects are not seen. Finer encoders, or motion that "
+            "differs a little from period to period, make it less"
+        )
+    found.extend(hardly_deflected(bench.data))
+    return tuple(found), share > MOST or bool(hardly_deflected(bench.data))
+
+
+def hardly_deflected(data: PeriodData) -> tuple[str, ...]:
+    """Sentences about springs whose deflection hardly changes beside its noise: their torque is not known."""
+    if data.periods < 2:
+        return ()
+    each = np.stack([motion.deflection for motion in data.period_motions])
+    noise = np.sqrt(np.mean(np.var(each, axis=0, ddof=1), axis=0) / data.averaged)
+    mean = data.motion.deflection
+    rms = np.sqrt(np.mean((mean - mean.mean(axis=0)) ** 2, axis=0))
+    return tuple(
+        f"{data.source}: the spring of {joint.name} changes its deflection by {rms[i]:.2g} {joint.position_unit} (rms) "
+        f"only, {rms[i] / noise[i]:.2g} times the noise of its mean: what it carries is not known. Load it more, or "
+        "measure it better"
+        for i, joint in enumerate(data.robot.joints)
+        if joint.elastic and rms[i] < HARDLY * noise[i]
+    )
