@@ -125,13 +125,13 @@ def conclude(
     doubted = notes.doubtful and verdict is not Verdict.NONE
     if doubted:
         verdict, lost, remainder = Verdict.CANNOT_TELL, True, 0.0
-    if notes.limited and verdict is Verdict.NOT_IN_LIBRARY:
-        verdict = Verdict.CANNOT_TELL
     if verdict is Verdict.NAMED and confirmed.among_the_slow > LARGEST_REMAINDER:
         verdict, remainder = Verdict.NAMED_WITH_REMAINDER, confirmed.among_the_slow
     without_doubt = (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS)
     if nameless and (verdict in without_doubt or (verdict is Verdict.SUSPECT and _known_better(missing, nameless))):
         verdict = Verdict.NOT_IN_LIBRARY
+    if notes.limited and verdict is Verdict.NOT_IN_LIBRARY:
+        verdict = Verdict.CANNOT_TELL
     judged = confirmed.beside or (confirmed.bench, confirmed.final)
     standing = longest_standing(judged[0].data)
     facts = words.Facts(

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from sea_ident.discrepancy.judge import own_torque
 from sea_ident.discrepancy.physics import (
+    LARGEST_OF_A_SENSOR,
     LARGEST_TIMES_TORQUE,
     WRONG_PART,
     bends_another,
@@ -31,6 +33,22 @@ def test_a_spring_with_dry_friction_is_one_where_it_takes_energy_out(nothing_mis
     # elastic torque takes nothing, but for the rounding of a sum over samples
     taken = float(np.mean(torque * speed)) / float(np.mean(np.abs(speed)))
     assert dissipates(bench, effect, np.eye(2)[element]) == (taken > 0.01)
+
+
+@pytest.mark.parametrize(("times", "possible_one"), [(0.9, True), (1.1, False)])
+def test_an_error_of_an_encoder_does_not_change_the_torque_by_many_times_what_there_is(
+    nothing_missing, times, possible_one
+):
+    """It does where a spring hardly moves, and its stiffness comes out as anything: then it explains whatever is."""
+    bench, start = nothing_missing
+
+    def with_offset(offset):
+        effects = (*start.fit.effects, make_effect("encoder_offset", "hip", offset=offset))
+        return bench.predicted(effects, start.fit.parameters)
+
+    size = times * LARGEST_OF_A_SENSOR
+    offset = brentq(lambda value: own_torque(bench, with_offset(value), -1) - size, 1e-3, 10.0)
+    assert physical(bench, with_offset(offset), -1) == possible_one
 
 
 def test_a_spring_that_takes_next_to_no_energy_out_is_not_accepted(nothing_missing):

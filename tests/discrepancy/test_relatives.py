@@ -94,6 +94,9 @@ def test_it_is_said_in_the_verdict_and_in_words(ripple_found):
     assert [diagnosis.verdict for diagnosis in said] == [Verdict.NAMED_WITH_REMAINDER, Verdict.NOT_IN_LIBRARY]
     # the nearest is still told
     assert [(m.effect, m.joint) for m in said[1].missing] == [("torque_ripple", "hip")]
+    # where sensors leave that open, no library is blamed
+    limited = conclude(bench, confirmed, nothing, {}, None, None, Findings(limited=True), (one,))
+    assert limited.verdict is Verdict.CANNOT_TELL
     assert "The same as torque_ripple at hip, but growing with the load, leaves" in said[1].text
 
 

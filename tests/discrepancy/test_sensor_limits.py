@@ -1,0 +1,118 @@
+"""What sensors cannot show is no missing effect."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident import identify
+from sea_ident.discrepancy import Verdict, diagnose
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.lack import lack_of_fit
+from sea_ident.discrepancy.noise import REPEATED_VARIANCE, noise_from_steps, step_freedom
+from sea_ident.discrepancy.sensor_limits import HARDLY, MOST, hardly_deflected, limits, steps_cover
+from sea_ident.discrepancy.settle import CONSISTENT, settle
+from sea_ident.simulation import SensorNoise
+
+PERIOD = 5.0
+
+
+def steps_of(bits):
+    """Encoders without noise, of so many bits at the link and four more at the motor."""
+    return SensorNoise(
+        link_position=0.0,
+        motor_position=0.0,
+        link_resolution=2.0 * np.pi / 2**bits,
+        motor_resolution=2.0 * np.pi / 2 ** (bits + 4),
+        current=0.01,
+        motor_torque=0.05,
+    )
+
+
+@pytest.fixture(scope="module")
+def coarse(laboratory):
+    """Recordings whose periods are all rounded at the same places, by bits; nothing is missing."""
+    return {bits: laboratory.record(periods=12, sensors=steps_of(bits)) for bits in (12, 14)}
+
+
+def test_an_error_that_no_scatter_shows_is_added_to_the_floor():
+    rng = np.random.default_rng(0)
+    steps = rng.standard_normal((20, 41, 2)) + 1j * rng.standard_normal((20, 41, 2))
+    floor = noise_from_steps(steps, 20.0, step_freedom(21))
+    error = np.zeros((3, 41, 2), dtype=complex)
+    error[:, :, 1] = 2.0
+    beside = floor.beside(error)
+    more = np.zeros((2, 2))
+    more[1, 1] = REPEATED_VARIANCE * 4.0
+    # of every real part half, and the constant has one only
+    np.testing.assert_allclose(beside.covariance[20] - floor.covariance[20], more / 2.0, atol=1e-12)
+    assert beside.freedom == floor.freedom
+    assert beside.std[1] > floor.std[1]
+    assert beside.std[0] == pytest.approx(floor.std[0])
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("bits", [12, 14])
+def test_steps_that_repeat_are_in_the_floor_and_nothing_is_looked_for_below_it(laboratory, coarse, bits):
+    data = laboratory.data(coarse[bits])
+    bench = Bench(data, laboratory.effects)
+    settled = settle(bench, bench.effects)
+    statistic, dof, p_value = lack_of_fit(bench, settled)
+    assert p_value > 0.01
+    # the size is right to the factor of two that it counts with, and the floor is that of the model it is found with
+    assert 0.3 < statistic / dof < 1.2
+    assert MOST < bench.share_of_steps(settled.fit, settled.noise) <= CONSISTENT
+    assert steps_cover(bench, settled)
+    # the same without: many times what scatters
+    blind = Bench(replace(data, step_errors=None), laboratory.effects)
+    without = settle(blind, blind.effects)
+    assert without.fit.statistic > 5.0 * without.fit.dof
+    assert blind.share_of_steps(without.fit, without.noise) == 0.0
+    assert not steps_cover(blind, without)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("bits", [12, 14])
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_coarse_encoders_are_told_and_nothing_is_named(laboratory, coarse, bits):
+    model = identify(laboratory.leg, coarse[bits], period=PERIOD)
+    found = diagnose(model, coarse[bits], holdout=laboratory.record(motion=1, sensors=steps_of(bits)))
+    assert found.verdict is Verdict.NONE
+    assert found.missing == ()
+    told = [text for text in found.warnings if "encoder steps do not average out" in text]
+    assert len(told) == 1
+    assert "q_hip" in told[0]
+    assert "smaller effects are not seen" in told[0]
+
+
+@pytest.mark.scenario
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_what_is_larger_than_steps_keeps_its_name(laboratory):
+    """A knee with 1.5 mrad of play, seen by encoders whose steps are 0.4 mrad."""
+    planted = [("backlash", "knee", [190.0], {"half_width": 0.004, "softness": 0.01})]
+    seen = [laboratory.record(planted, periods=12, motion=m, sensors=steps_of(14)) for m in (0, 1)]
+    found = diagnose(identify(laboratory.leg, seen[0], period=PERIOD), seen[0], holdout=seen[1])
+    assert found.verdict is Verdict.NAMED
+    assert [(m.effect, m.joint) for m in found.missing] == [("backlash", "knee")]
+
+
+def test_a_spring_that_hardly_moves_is_told(laboratory, nothing_missing):
+    bench, start = nothing_missing
+    data = bench.data
+    assert hardly_deflected(data) == ()
+    assert limits(bench, start, None) == ((), False)
+    knee = bench.robot.index("knee")
+    deflection = data.motion.deflection[:, knee] - data.motion.deflection[:, knee].mean()
+    scatter = np.std([motion.deflection[:, knee] for motion in data.period_motions], axis=0, ddof=1)
+    noise = np.sqrt(np.mean(scatter**2) / data.averaged)
+    for times, told in ((0.9, True), (1.1, False)):
+        share = times * HARDLY * noise / np.sqrt(np.mean(deflection**2))
+        theta = data.motion.theta.copy()
+        theta[:, knee] -= (1.0 - share) * deflection
+        still = replace(data, motion=replace(data.motion, theta=theta))
+        texts = hardly_deflected(still)
+        assert len(texts) == told
+        assert all("spring of knee" in text and f"{times * HARDLY:.2g} times the noise" in text for text in texts)
+    assert limits(
+        bench.__class__(replace(still, motion=replace(data.motion, theta=data.motion.q)), bench.effects), start, None
+    )[1]
