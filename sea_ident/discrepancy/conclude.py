@@ -296,9 +296,11 @@ def _missing(
         effect = fit.effects[position]
         begin = sum(counts[:position])
         columns = fit.columns[begin : begin + counts[position]]
+        seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
         parameters = [
             MissingParameter(c.name, float(fit.values[begin + i]), fit.std(begin + i), c.unit)
             for i, c in enumerate(columns)
+            if seen[i]
         ]
         parameters.extend(_shape_parameters(bench, fit, position))
         transfer = held.transfers[k] if held is not None and held.transfers else None
@@ -328,7 +330,7 @@ def _shape_parameters(bench: Bench, fit: Fit, position: int) -> list[MissingPara
         for k, (owner, free) in enumerate(fit.free_shapes):
             if owner == position and free.name == shape.name:
                 step = fit.std(len(fit.columns) + k)
-                std = step * abs(value) if shape.logarithmic else step * (shape.upper - shape.lower)
+                std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
         out.append(
             MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
         )

@@ -14,12 +14,13 @@ from sea_ident.discrepancy.free_shapes import free_shapes, is_signal
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import NoiseFloor, closed_freedom
 from sea_ident.discrepancy.settle import Settled
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, Shape
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.presliding_friction import PreslidingFriction
+from sea_ident.effects.signal import SignalEffect
 
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
@@ -104,8 +105,11 @@ def spread(steps: FloatArray, change: FloatArray) -> float:
 def at_a_bound(effect: Effect) -> bool:
     """Whether a width, a speed or a distance of an effect ended at the end of its range: then it is something else.
 
-    So is dry friction that turns over as slowly as any may, and friction that grows with as low a power as there is.
+    So is dry friction that turns over as slowly as any may, friction that grows with as low a power as there is, and an
+    error of a sensor that is as large as any may be.
     """
+    if isinstance(effect, SignalEffect):
+        return any(_at_an_end(float(getattr(effect, amount.name)), amount) for amount in effect.ranges())
     for shape in effect.shapes:
         value = float(getattr(effect, shape.name))
         least, most = value < 1.02 * shape.lower, value > 0.98 * shape.upper
@@ -118,6 +122,11 @@ def at_a_bound(effect: Effect) -> bool:
         if least or most:
             return True
     return False
+
+
+def _at_an_end(amount: float, within: Shape) -> bool:
+    """Whether an amount is as large as its range allows."""
+    return amount > 0.98 * within.upper or (within.lower < 0.0 and amount < 0.98 * within.lower)
 
 
 def is_push(effect: Effect) -> TypeGuard[ExternalForce]:

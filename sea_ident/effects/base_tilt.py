@@ -16,6 +16,11 @@ from sea_ident.robot import Robot
 LARGEST = 1.0
 """Angle beyond which the columns are not followed: no base stands so, and near a right angle they vanish [rad]."""
 
+HARDLY_SEEN = 1e-3
+"""Share of the torque by a rotation about one axis below which that about the other is none, as long as none is known: a
+robot that moves in an upright plane does not feel it turn about an axis in the plane, but for the digits that the plane
+was given with [-]."""
+
 
 @dataclass(frozen=True)
 class BaseTilt(Effect):
@@ -67,7 +72,10 @@ class BaseTilt(Effect):
             change = along * sideways - across * np.cross(turn, sideways)
             # the base turns by an angle, so gravity turns the other way as the robot sees it
             columns.append(-state.gravity_torque(change, inertial))
-        return state.body_columns(np.stack(columns, axis=2))
+        out = np.stack(columns, axis=2)
+        sizes = np.linalg.norm(out, axis=(0, 1))
+        out[:, :, (sizes < HARDLY_SEEN * np.max(sizes)) & (np.array(self.angles) == 0.0)] = 0.0
+        return state.body_columns(out)
 
     def anchored(self, anchor: Anchor) -> "BaseTilt":
         """With the inertial parameters of the model, and the angles that it has by now."""

@@ -66,6 +66,12 @@ class LinkFlexibility(SignalEffect):
             cubic_stiffness=ratio * (self.cubic_stiffness or 0.0),
         )
 
+    def ranges(self) -> tuple[Shape, ...]:
+        """A compliance up to that of the spring before the encoder, where this is a soft one."""
+        if self.stiffness is None or not self.stiffness > 0.0:
+            return self.amounts
+        return tuple(replace(each, upper=max(each.upper, 1.0 / self.stiffness)) for each in self.amounts)
+
     def corrected(self, robot: Robot, motion: Motion) -> Motion:
         """Q of the bodies."""
         i = self.required_index(robot)

@@ -43,6 +43,15 @@ def test_what_does_not_hold_goes_and_where_nothing_holds_the_worst(shares, drift
         # dry friction as sharp as there is, and one that no speed of the motion is beyond
         ("link_friction", {"smoothing": 1e-4}, False),
         ("link_friction", {"smoothing": 0.3}, True),
+        # an error of a sensor as large as any, to either side, and one that is none
+        ("encoder_eccentricity", {"sine": -0.2}, True),
+        ("encoder_eccentricity", {"sine": -0.15, "cosine": 0.15}, False),
+        ("encoder_eccentricity", {"cosine": 0.2}, True),
+        ("link_flexibility", {"compliance": 0.0}, False),
+        ("link_flexibility", {"compliance": 0.01}, True),
+        # beside a soft spring a link may give way by more
+        ("link_flexibility", {"compliance": 0.01, "stiffness": 20.0}, False),
+        ("link_flexibility", {"compliance": 0.05, "stiffness": 20.0}, True),
     ],
 )
 def test_a_width_that_ended_at_the_end_of_its_range_is_something_else(name, shapes, ended):
