@@ -17,9 +17,9 @@ LARGEST = 1.0
 """Angle beyond which the columns are not followed: no base stands so, and near a right angle they vanish [rad]."""
 
 HARDLY_SEEN = 1e-3
-"""Share of the torque by a rotation about one axis below which that about the other is none, as long as none is known: a
-robot that moves in an upright plane does not feel it turn about an axis in the plane, but for the digits that the plane
-was given with [-]."""
+"""Share of the torque by a rotation about one axis below which that about the other is none, as long as its angle is 0:
+a robot that moves in an upright plane does not feel it turn about an axis in the plane, but for the digits that the
+plane was given with [-]."""
 
 
 @dataclass(frozen=True)
