@@ -107,6 +107,7 @@ def diagnose(
         processed = wide_processing(recording, robot, period or _period_of(model, recording))
     if processed.period is None or processed.periods < 2:
         return diagnose_unrepeated(model, processed, recording)
+    recording = processed.used_of(recording)
     if processed.periods < FEWEST_PERIODS and isinstance(recording, Recording):
         pushes = pushes_between_passes(model, recording, processed)
         if pushes:

@@ -119,6 +119,7 @@ def held_out(
             f"the held-out recording {processed.source} holds less than two periods of a motion: nothing can be tested "
             "on it. Record it periodically, several periods",
         )
+    holdout = processed.used_of(holdout)
     data, findings = check.cleaned(period_data(processed, bench.robot), holdout)
     warnings = [f"held-out data: {text}" for text in findings.warnings]
     misplaced = misplaced_columns(bench.robot, bench.effects, processed)

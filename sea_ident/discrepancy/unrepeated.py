@@ -152,7 +152,8 @@ def diagnose_unrepeated(
     notes.append(
         "one stretch without a mean of periods: what the model leaves counts as noise, nothing is said about lack of "
         f"fit, and what is told rests on the prediction of {BLOCKS} blocks from each other, which is weaker than "
-        "periods. Record the same motion ten times or more"
+        "periods. If the motion repeats, give its period (period=, on the command line --period); else record the same "
+        "motion ten times or more"
     )
     repaired = None if pushes else repaired_model(model, processed, now.fit)
     diagnosis = Diagnosis(

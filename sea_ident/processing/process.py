@@ -2,6 +2,7 @@
 
 import warnings as python_warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from sea_ident.arguments import expect, expect_number
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.one_thread import one_thread
-from sea_ident.processing import filtering, harmonics, periods, torque, variance
+from sea_ident.processing import filtering, harmonics, periods, rest, torque, variance
 from sea_ident.processing.doubt import Doubt, DoubtKind
 from sea_ident.processing.encoder_steps import encoder_steps
 from sea_ident.processing.processed import ProcessedRecording
@@ -59,14 +60,14 @@ def process(
     expect(recording, "process: recording", Recording)
     expect(robot, "process: robot", Robot)
     expect_number(period, "process: period", "s")
-    signals = read_signals(recording, robot)
-    uniform = recording.is_uniform
+    moving, signals, period = _in_motion(recording, robot, period)
+    uniform = moving.is_uniform
     if period is None:
-        period = _detected(recording, robot, signals, uniform)
-    if period is None:
-        result = _not_periodic(recording, robot, signals, uniform, cutoff)
+        result = _not_periodic(moving, robot, signals, uniform, cutoff)
     else:
-        result = _periodic(recording, robot, signals, uniform, period, link_harmonics, motor_harmonics, smoothing)
+        result = _periodic(moving, robot, signals, uniform, period, link_harmonics, motor_harmonics, smoothing)
+    if moving is not recording:
+        result = _told_of_rest(result, recording, moving)
     for text in result.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
     return result
@@ -149,6 +150,39 @@ def _one_stretch(
         warnings=tuple(warnings),
         doubts=tuple(doubts),
     )
+
+
+def _in_motion(recording: Recording, robot: Robot, period: float | None) -> tuple[Recording, Signals, float | None]:
+    """What periods are cut from, without rest at its ends, its signals, and the period; else all of the recording."""
+    moving = rest.without_rest(recording, robot)
+    signals = read_signals(moving, robot)
+    found = period or _detected(moving, robot, signals, moving.is_uniform)
+    if moving is recording:
+        return recording, signals, found
+    if found is None or moving.duration < found:
+        # what looks like rest may be a small motion, and of what has no period rest says something, too
+        return recording, read_signals(recording, robot), period
+    if moving.time[-1] < recording.time[-1]:
+        if period is None:
+            # a stop bends the period
+            before = rest.without_stop(moving, robot, found)
+            signals = read_signals(before, robot)
+            found = _detected(before, robot, signals, before.is_uniform) or found
+        moving = rest.without_stop(moving, robot, found)
+        signals = replace(read_signals(moving, robot), notes=signals.notes)
+    return moving, signals, found
+
+
+def _told_of_rest(result: ProcessedRecording, recording: Recording, moving: Recording) -> ProcessedRecording:
+    """The result with what was left out of the recording."""
+    extent = float(moving.time[0]), float(moving.time[-1])
+    before, after = extent[0] - float(recording.time[0]), float(recording.time[-1]) - extent[1]
+    where = [f"{s:.3g} s at the {end}" for s, end in ((before, "beginning"), (after, "end")) if s > 0.0]
+    text = (
+        f"{recording.source}: the robot rests, or comes to rest, for {' and '.join(where)} of the recording: left out, "
+        "so that no period holds rest"
+    )
+    return replace(result, extent=extent, warnings=(*result.warnings, text))
 
 
 def _detected(recording: Recording, robot: Robot, signals: Signals, uniform: bool) -> float | None:

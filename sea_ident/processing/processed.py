@@ -7,6 +7,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.motion import Motion
 from sea_ident.processing.doubt import Doubt
 from sea_ident.processing.encoder_steps import EncoderSteps
+from sea_ident.recordings import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,8 @@ class ProcessedRecording:
         link_harmonics: harmonics kept in q, 0 where the recording is not periodic.
         motor_harmonics: harmonics kept in theta, 0 where the recording is not periodic.
         encoder_steps: steps of encoders that do not average out, None where all do.
+        extent: times of the first and the last sample that periods were cut from, where the robot rests before or after
+            [s]; None where the whole recording was used.
         notes: what was done.
         warnings: what a user should know before trusting the result.
         doubts: those of the warnings that what is concluded depends on.
@@ -51,6 +54,7 @@ class ProcessedRecording:
     link_harmonics: int
     motor_harmonics: int
     encoder_steps: EncoderSteps | None = None
+    extent: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
@@ -70,6 +74,12 @@ class ProcessedRecording:
     def periodic(self) -> bool:
         """Whether the recording was cut into periods."""
         return self.period is not None
+
+    def used_of(self, recording: "Recording | ProcessedRecording") -> "Recording | ProcessedRecording":
+        """The part of the recording it comes from that periods were cut from: they are the last ones of it."""
+        if self.extent is None or isinstance(recording, ProcessedRecording):
+            return recording
+        return recording.crop(*self.extent)
 
     def summary(self) -> str:
         """What came out, in a few lines."""

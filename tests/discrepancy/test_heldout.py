@@ -5,10 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import sea_ident
 from sea_ident.discrepancy.heldout import Kind, held_out, other_periods, tried, without_history
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
+from sea_ident.exceptions import DiagnosisError
+from sea_ident.recordings import Recording
+
+PERIOD = 5.0
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +53,30 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     hip = [e.joint == "hip" and str(e.kind) == "motor" for e in found.bench.data.equations].index(True)
     power = [np.sum(np.abs(fit.residual[:, hip]) ** 2) for fit in (found.before, found.after)]
     assert power[1] < 0.3 * power[0]
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_rest_after_either_recording_is_in_nothing_that_is_looked_at(leg, laboratory, ripple, with_ripple, monkeypatch):
+    """What is read beside the periods is read from the same part of a recording: its end is theirs."""
+
+    def and_rest(recording):
+        rested = {n: np.concatenate([v, np.full(1000, v[-1])]) for n, v in recording.columns.items()}
+        step = recording.duration / (recording.samples - 1)
+        return Recording(np.arange(recording.samples + 1000) * step, rested, "rested")
+
+    seen = []
+
+    def cleaned(data, recording):
+        seen.append(recording)
+        raise DiagnosisError("seen")
+
+    monkeypatch.setattr("sea_ident.discrepancy.check.cleaned", cleaned)
+    with pytest.raises(DiagnosisError, match="seen"):
+        held_out(*ripple, and_rest(with_ripple))
+    model = sea_ident.identify(leg, with_ripple, period=PERIOD)
+    with pytest.raises(DiagnosisError, match="seen"):
+        sea_ident.diagnose(model, and_rest(with_ripple))
+    assert [part.samples for part in seen] == pytest.approx([with_ripple.samples] * 2, rel=0.01)
 
 
 @pytest.mark.scenario

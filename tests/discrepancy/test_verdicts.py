@@ -118,7 +118,9 @@ def test_a_reference_whose_effects_the_recording_cannot_show_is_not_compared_and
 
 
 def test_cannot_tell_from_one_pass(laboratory, model):
-    assert quietly(model, laboratory.record(periods=1)).verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
+    found = quietly(model, laboratory.record(periods=1))
+    assert found.verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
+    assert any("give its period (period=, on the command line --period)" in text for text in found.warnings)
 
 
 @pytest.mark.scenario
