@@ -1,6 +1,6 @@
 """Checks at the border: recordings that prove nothing, clipped channels, spikes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,12 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import mean_of_periods
 from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.discrepancy.findings import Gap
+from sea_ident.effects import Effect
 from sea_ident.estimation import Model
+from sea_ident.estimation.identify import visible_parameters
+from sea_ident.estimation.misplaced import misplaced_columns
+from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.signs import turned_torques
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -136,6 +141,24 @@ def channels_move(robot: Robot, recording: Recording | ProcessedRecording) -> No
                 f"told. Record it, or identify and diagnose a model without {name!r} (joints, on the command "
                 "line --joints)"
             )
+
+
+def wrong_columns(robot: Robot, effects: Sequence[Effect], processed: ProcessedRecording) -> tuple[str, ...]:
+    """What is wrong with the columns of a recording beyond doubt: nothing can be concluded from it.
+
+    Args:
+        robot: the robot.
+        effects: the model, without its springs.
+        processed: the recording, of two periods or more.
+
+    Returns:
+        Sentences; none where the columns may be as they say.
+    """
+    misplaced = misplaced_columns(robot, effects, processed)
+    if misplaced is not None:
+        return (misplaced,)
+    base, _ = visible_parameters(robot, tuple(effects), processed)
+    return turned_torques(Observations(robot, tuple(effects), base, processed))
 
 
 def temperatures(recording: Recording | ProcessedRecording, data: PeriodData) -> FloatArray | None:

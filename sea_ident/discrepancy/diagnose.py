@@ -42,7 +42,7 @@ from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
-from sea_ident.estimation.misplaced import misplaced_columns
+from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
@@ -117,9 +117,8 @@ def diagnose(
             return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
     whole = period_data(processed, robot)
     data, notes = check.cleaned(whole, recording)
-    misplaced = misplaced_columns(robot, model.effects, processed)
-    if misplaced is not None:
-        notes = check.Findings((*notes.warnings, misplaced), fatal=True)
+    wrong = check.wrong_columns(robot, model.effects, processed)
+    notes = check.Findings((*notes.warnings, *wrong), fatal=notes.fatal or bool(wrong))
     notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
     temperature = check.temperatures(recording, data)
     bench = Bench(data, model_effects(model))
@@ -127,7 +126,7 @@ def diagnose(
     basic = completed(bench)
     if basic is not None:
         found = _compared(bench, confirm(bench, basic.selection), temperature)
-    elif data.periods < FEWEST_TO_SEARCH or misplaced is not None or _in_steps(bench):
+    elif data.periods < FEWEST_TO_SEARCH or wrong or _in_steps(bench):
         found = _compared(bench, confirm(bench, _unsearched(bench)), temperature)
     else:
         found = _searched(bench, temperature, tell)
@@ -153,18 +152,10 @@ def diagnose(
     repaired, *others = side_by_side(lambda given: repaired_model(model, *given), fits)
     forward = _forward(others[0] if others else None, repaired, held, recording, processed, controller)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
-    basic_notes = (*circular_springs(robot, recording), *(() if basic is None else basic.warnings))
-    open_by_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
-    said = (
-        *notes.warnings,
-        *open_by_sensors,
-        *found.notes,
-        *basic_notes,
-        *spoken,
-        *held_notes,
-        *change_notes,
-        *forward.notes,
-    )
+    of_springs = (*doubts_of_springs(robot, model.springs), *circular_springs(robot, recording))
+    of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
+    basic_notes = (*of_sensors, *of_springs, *(() if basic is None else basic.warnings))
+    said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *forward.notes)
     notes = replace(notes, warnings=said, limited=limited)
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)

@@ -40,6 +40,7 @@ from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
 from sea_ident.effects import Effect, make_effect, spring_effects
 from sea_ident.estimation import Model
+from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording, filter_recording
 from sea_ident.processing.doubt import DoubtKind, texts_of
@@ -148,7 +149,7 @@ def diagnose_unrepeated(
     gap = _gap(bench, start.fit, now.fit, pushes)
     notes = [text for text in processed.warnings if "no period" not in text]
     notes.extend(() if basic is None else basic.warnings)
-    notes.extend(circular.circular_springs(robot, recording))
+    notes.extend((*doubts_of_springs(robot, model.springs), *circular.circular_springs(robot, recording)))
     notes.append(
         "one stretch without a mean of periods: what the model leaves counts as noise, nothing is said about lack of "
         f"fit, and what is told rests on the prediction of {BLOCKS} blocks from each other, which is weaker than "

@@ -21,7 +21,7 @@ from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.repeated_steps import repeated_steps
-from sea_ident.estimation.scales import other_scale
+from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.estimation.separability import unseparated_friction
 from sea_ident.estimation.signs import check_signs
 from sea_ident.estimation.solve import condition_number, solve_weighted
@@ -175,16 +175,8 @@ def _doubts(model: Model) -> list[str]:
     """What a user should know before trusting the numbers, from the numbers."""
     found = [*unseparated_friction(model.base, model.values, model.uncertainty)]
     found.extend(f"spring of {s.joint}: {s.note}" for s in model.springs if s.verdict in UNSAFE)
-    found.extend(
-        f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g}, "
-        f"deflection {s.largest_deflection:.3g} at most): have the encoders of link and motor different zeros "
-        "(unknown_zero, on the command line --unknown-zero), has one of them the wrong sign, or does the model lack "
-        "friction of the link (effect link_friction)?"
-        for s in model.springs
-        if s.stiffness < -5.0 * s.stiffness_noise_std
-    )
     found.extend(text for text in (spring.doubt() for spring in model.springs) if text is not None)
-    found.extend(other_scale(model.robot, model.springs))
+    found.extend(doubts_of_springs(model.robot, model.springs))
     return found
 
 

@@ -133,6 +133,7 @@ def _orders(robot: Robot, torque: str) -> Iterator[_Order]:
         positions = ("q", "theta") if i in elastic else ("q",)
         yield _Order(own, own, own, plain, turned, _reversed((torque,), name))
         yield _Order(own, own, own, turned, plain, _reversed(positions, name))
+        yield _Order(own, own, own, turned, turned, _reversed((*positions, torque), name))
 
 
 def _exchanged(what: str, kinds: tuple[str, ...], a: str, b: str) -> str:
@@ -141,7 +142,8 @@ def _exchanged(what: str, kinds: tuple[str, ...], a: str, b: str) -> str:
 
 
 def _reversed(kinds: tuple[str, ...], joint: str) -> str:
-    columns = " and ".join(f"{kind}_{joint}" for kind in kinds)
+    *first, last = (f"{kind}_{joint}" for kind in kinds)
+    columns = f"{', '.join(first)} and {last}" if first else last
     names = ", ".join(f"'{kind}_{joint}={kind}_{joint},sign=-1'" for kind in kinds)
     verb = "has" if len(kinds) == 1 else "have"
     return f"{columns} {verb} the other sign, by the other joints. Turn it: ColumnSource, or --column with {names}"

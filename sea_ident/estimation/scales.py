@@ -12,6 +12,27 @@ RECOGNISED = 0.25
 """Deviation from the gear ratio up to which it is recognised; a spring that stiffens is described otherwise [-]."""
 
 
+def doubts_of_springs(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
+    """Sentences about springs that come out as no spring can be, or as the description does not have them.
+
+    Args:
+        robot: the robot.
+        springs: what was identified.
+
+    Returns:
+        What may be wrong with the columns or the units of a recording, or with the model.
+    """
+    found = [
+        f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g}, "
+        f"deflection {s.largest_deflection:.3g} at most): have the encoders of link and motor different zeros "
+        "(unknown_zero, on the command line --unknown-zero), has one of them the wrong sign, or does the model lack "
+        "friction of the link (effect link_friction)?"
+        for s in springs
+        if s.stiffness < -5.0 * s.stiffness_noise_std
+    ]
+    return [*found, *other_scale(robot, springs)]
+
+
 def other_scale(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
     """A sentence where all springs differ from the description in one direction: then it is the torque that does.
 

@@ -8,6 +8,9 @@ from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing.doubt import DoubtKind, texts_of
 
+SURE = 5.0
+"""Standard deviations by which an inertia or a work must be negative."""
+
 
 def check_signs(observations: Observations, misplaced: str | None = None) -> list[str]:
     """Sentences about joints whose inertia comes out negative.
@@ -24,7 +27,7 @@ def check_signs(observations: Observations, misplaced: str | None = None) -> lis
     """
     robot, source = observations.robot, observations.processed.source
     inertia, std = joint_inertias(observations)
-    negative = inertia < -5.0 * std
+    negative = inertia < -SURE * std
     names = [name for name, bad in zip(robot.joint_names, negative, strict=True) if bad]
     if names and len(names) == robot.n:
         raise IdentificationError(
@@ -42,6 +45,34 @@ def check_signs(observations: Observations, misplaced: str | None = None) -> lis
         "joints are wrong with it"
         for name in names
     ]
+
+
+def turned_torques(observations: Observations) -> tuple[str, ...]:
+    """Sentences about joints whose torque has the wrong sign beyond doubt.
+
+    A model that lacks much may have a negative inertia with every column as it should be: a spring beside the motor
+    asks for less torque the farther the joint is accelerated away from its middle. Yet its motor does work against
+    friction in every period. With the other sign of the torque the motor takes up what it gives off.
+
+    Args:
+        observations: the recording, of two periods or more, and the model.
+
+    Returns:
+        One for each joint with a negative inertia whose motor takes up work; none where all signs may be right.
+    """
+    processed = observations.processed
+    inertia, std = joint_inertias(observations)
+    rates = np.stack([motion.dtheta for motion in processed.period_motions])
+    works = np.mean(processed.period_tau_motor * rates, axis=1)
+    work, spread = works.mean(axis=0), works.std(axis=0, ddof=1) / np.sqrt(len(works))
+    turned = (inertia < -SURE * std) & (work < -SURE * spread)
+    return tuple(
+        f"{processed.source}: the inertia that joint {joint.name!r} moves comes out negative from its own torque, and "
+        f"its motor takes up {-power:.3g} W where friction must cost it some: that torque or current has the wrong "
+        f"sign. Exchange it ({_exchanged(joint.name)}); or have all positions of that joint the wrong one?"
+        for joint, power, bad in zip(observations.robot.joints, work, turned, strict=True)
+        if bad
+    )
 
 
 def _of_another_period(observations: Observations) -> str:

@@ -1,6 +1,7 @@
 """Planted effects are found, named and shown to transfer; nothing is named where nothing is missing."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -150,6 +151,24 @@ def test_nothing_is_concluded_where_joints_changed_places(intact, intact_model):
     assert tested.verdict == "none"
     assert any(text.startswith("held-out data: ") and "look exchanged" in text for text in tested.warnings)
     assert any("cannot be used; nothing was tested on it" in text for text in tested.warnings)
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_nothing_is_looked_for_where_a_torque_has_the_wrong_sign(intact, intact_model, monkeypatch):
+    """It is said of which joint; and what is doubtful about the springs of the model is repeated."""
+
+    def never(*arguments, **options):
+        raise AssertionError("searched")
+
+    # the function has the name of its module
+    monkeypatch.setattr(sys.modules["sea_ident.discrepancy.diagnose"], "search", never)
+    training = intact[0]
+    turned = training.replace_columns({"current_ankle": -training.columns["current_ankle"]})
+    springs = tuple(replace(s, linear_stiffness=0.01 * s.linear_stiffness) for s in intact_model.springs)
+    found = sea_ident.diagnose(replace(intact_model, springs=springs), turned)
+    assert (found.verdict, found.missing) == ("cannot_tell", ())
+    assert any("the inertia that joint 'ankle' moves comes out negative" in text for text in found.warnings)
+    assert any("no spring has the stiffness that is described" in text for text in found.warnings)
 
 
 @pytest.mark.scenario

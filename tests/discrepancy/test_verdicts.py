@@ -118,7 +118,9 @@ def test_a_reference_whose_effects_the_recording_cannot_show_is_not_compared_and
 
 
 def test_cannot_tell_from_one_pass(laboratory, model):
-    found = quietly(model, laboratory.record(periods=1))
+    negative = replace(model, springs=(replace(model.springs[0], stiffness=-1000.0), *model.springs[1:]))
+    found = quietly(negative, laboratory.record(periods=1))
+    assert any("spring of hip: its stiffness comes out negative" in text for text in found.warnings)
     assert found.verdict in (Verdict.CANNOT_TELL, Verdict.NONE)
     assert any("give its period (period=, on the command line --period)" in text for text in found.warnings)
 

@@ -49,6 +49,14 @@ def test_joints_that_changed_places_are_named(leg, clean, kinds, pair):
     assert f"--column with {names}. With that" in found
 
 
+def test_a_joint_that_turns_the_other_way_is_named(leg, clean):
+    """All of its columns follow another convention than the model."""
+    kinds = (*POSITIONS, "tau_motor")
+    found = misplaced_columns(leg, base_effects(leg), processed_of(leg, reversed_(clean, kinds, "knee")))
+    assert "q_knee, theta_knee and tau_motor_knee have the other sign" in found
+    assert "'tau_motor_knee=tau_motor_knee,sign=-1'" in found
+
+
 @pytest.mark.parametrize(
     ("kinds", "joint"),
     [(("tau_motor",), "hip"), (("tau_motor",), "knee"), (POSITIONS, "hip"), (POSITIONS, "knee"), (POSITIONS, "ankle")],
