@@ -19,6 +19,7 @@ from sea_ident.estimation.signs import turned_torques
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
+from sea_ident.recordings.recording import slower_than_any
 from sea_ident.robot import Robot
 
 CLIPPED_RUN = 4
@@ -141,6 +142,19 @@ def channels_move(robot: Robot, recording: Recording | ProcessedRecording) -> No
                 f"told. Record it, or identify and diagnose a model without {name!r} (joints, on the command "
                 "line --joints)"
             )
+
+
+def clock_in_seconds(recording: Recording | ProcessedRecording) -> None:
+    """Refuse a recording whose time cannot be in seconds: no effect of its inertia shows, and any search is long.
+
+    Raises:
+        DiagnosisError: no robot that is to be identified moves as slowly.
+    """
+    slow = None if isinstance(recording, ProcessedRecording) else slower_than_any(recording.time, recording.columns)
+    if slow is not None:
+        raise DiagnosisError(
+            f"{recording.source}: {slow}. If it is in seconds, record a faster motion: nothing shows here"
+        )
 
 
 def wrong_columns(robot: Robot, effects: Sequence[Effect], processed: ProcessedRecording) -> tuple[str, ...]:

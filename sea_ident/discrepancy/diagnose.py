@@ -86,7 +86,7 @@ def diagnose(
         The diagnosis.
 
     Raises:
-        DiagnosisError: the recordings prove nothing (the same twice, another robot).
+        DiagnosisError: the recordings prove nothing (the same twice, another robot, time in another unit).
         RecordingError: a recording lacks what is needed.
     """
     expect(model, "diagnose: model", Model)
@@ -100,6 +100,7 @@ def diagnose(
         if given is not None:
             check.columns_match(robot, given)
             check.channels_move(robot, given)
+            check.clock_in_seconds(given)
     if holdout is not None:
         not_the_same(recording, holdout)
     with python_warnings.catch_warnings():

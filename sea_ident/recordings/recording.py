@@ -25,6 +25,22 @@ SHORTEST_INTERVAL = 1e-9
 WRAP_TOLERANCE = 0.3
 """A step of an angle this close to a whole turn [rad] is reported, where most steps are below this."""
 
+SLOWEST_CLOCK = 0.5
+"""A median interval from this on [s] is doubted: no motion shows in such samples."""
+
+FASTEST_LOG = 0.02
+"""A median interval from this on [s] is one of milliseconds where nothing moves faster than `SLOW` for `LONG`."""
+
+SLOW = 0.01
+"""Speed of positions [rad/s] or [m/s] below which no inertia shows: a robot that moves takes a thousandfold of that in
+milliseconds."""
+
+LONG = 1000.0
+"""Duration [s] from which on a slow motion is doubted."""
+
+SPEED_SAMPLES = 10
+"""Samples over which a speed is taken: encoders step now and then."""
+
 LARGEST_VALUE = 1e12
 """A time or a known quantity beyond this in SI units is refused: it is corrupt or in another unit."""
 
@@ -294,11 +310,42 @@ def _warnings(time: FloatArray, columns: Mapping[str, FloatArray], source: str) 
             f"{source}: {gaps.size} gaps in time, the longest of {steps[k]:g} s after sample {k} "
             f"(time {time[k]:g} s), where the median interval is {median:g} s"
         )
-    if median >= 0.5:
-        unit, name = ("ms", "milliseconds") if median < 100.0 else ("us", "microseconds")
-        unit, name = (unit, name) if median < 1e5 else ("ns", "nanoseconds")
-        found.append(
-            f"{source}: the median interval is {median:g} s; if time is in {name}, say columns={{'time': "
-            f"ColumnSource('time', unit='{unit}')}}, on the command line --column time=time,unit={unit}"
-        )
+    slow = slower_than_any(time, columns)
+    if median >= SLOWEST_CLOCK:
+        found.append(f"{source}: the median interval is {median:g} s; {_clock(median)}")
+    elif slow is not None:
+        found.append(f"{source}: {slow}")
     return found
+
+
+def slower_than_any(time: FloatArray, columns: Mapping[str, FloatArray]) -> str | None:
+    """What time is written in where positions move as slowly as no robot that is to be identified does.
+
+    Args:
+        time: (N,) [s].
+        columns: samples (N,) by name; links count.
+
+    Returns:
+        How fast they move and what to say of time; None where time may be in seconds.
+    """
+    interval = float(np.median(np.diff(time)))
+    links = [values for name, values in columns.items() if (split_name(name) or ("", ""))[0] == "q"]
+    if interval < FASTEST_LOG or time[-1] - time[0] < LONG or not links:
+        return None
+    span = time[SPEED_SAMPLES:] - time[:-SPEED_SAMPLES]
+    fastest = max(
+        float(np.max(np.abs(values[SPEED_SAMPLES:] - values[:-SPEED_SAMPLES]) / span, initial=0.0)) for values in links
+    )
+    if not 0.0 < fastest < SLOW:
+        return None
+    return f"no position moves faster than {fastest:.2g} rad/s or m/s: {_clock(interval)}"
+
+
+def _clock(interval: float) -> str:
+    """What to say of time with a median interval [s] that is too long."""
+    unit, name = ("ms", "milliseconds") if interval < 100.0 else ("us", "microseconds")
+    unit, name = (unit, name) if interval < 1e5 else ("ns", "nanoseconds")
+    return (
+        f"if time is in {name}, say columns={{'time': ColumnSource('time', unit='{unit}')}}, on the command line "
+        f"--column time=time,unit={unit}"
+    )

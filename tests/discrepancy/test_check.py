@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.check import Findings, channels_move, drowned
+from sea_ident.discrepancy.check import Findings, channels_move, clock_in_seconds, drowned
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording
@@ -50,3 +50,15 @@ def test_only_what_is_used_has_to_move():
     columns[f"current_{name}"] = np.zeros(200)
     with pytest.raises(DiagnosisError, match=f"column current_{name} is constant, 0: no torque is measured"):
         channels_move(slide, Recording(time=time, columns=columns, source="a.csv"))
+
+
+@pytest.mark.parametrize("rate", [200, 5000])
+def test_time_that_is_not_in_seconds_is_refused(rate):
+    """A search in it takes minutes and finds nothing."""
+    time = np.arange(20 * rate) / rate
+    columns = {"q_hip": 0.8 * np.sin(time)}
+    clock_in_seconds(Recording(time, columns, "a.csv"))
+    with pytest.raises(
+        DiagnosisError, match=r"a.csv: no position moves faster.*--column time=time,unit=ms. If it is in"
+    ):
+        clock_in_seconds(Recording(1e3 * time, columns, "a.csv"))

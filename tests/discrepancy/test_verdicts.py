@@ -16,6 +16,7 @@ from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries
+from sea_ident.recordings import Recording
 
 PERIOD = 5.0
 
@@ -263,6 +264,13 @@ def test_a_dead_channel_is_refused_in_either_recording(model, intact, column):
         sea_ident.diagnose(model, dead)
     with pytest.raises(DiagnosisError, match=f"column {column} is constant"):
         sea_ident.diagnose(model, intact, holdout=dead)
+
+
+def test_time_in_milliseconds_is_refused_in_either_recording(model, intact):
+    late = Recording(1e3 * intact.time, intact.columns, "ms.csv")
+    for recordings in ((late, None), (intact, late)):
+        with pytest.raises(DiagnosisError, match="ms.csv: no position moves faster"):
+            quietly(model, recordings[0], holdout=recordings[1])
 
 
 def test_the_order_of_the_columns_does_not_matter(model, intact):

@@ -118,6 +118,28 @@ def test_unknown_names_are_kept_and_reported():
     assert "battery, q;" in text
 
 
+@pytest.mark.parametrize("rate", [100, 1000, 2000, 5000, 20000])
+@pytest.mark.parametrize("step", [0.0, 1.5e-3], ids=["fine", "coarse"])
+def test_time_in_milliseconds_is_noticed_at_any_rate(rate, step):
+    """Samples of 5 kHz would be of 5 Hz, which is no wonder in itself: the motion is a thousand times too slow."""
+    time = np.arange(20 * rate) / rate
+    angle = 0.8 * np.sin(2.0 * np.pi * time / 5.0)
+    angle = step * np.round(angle / step) if step else angle
+    (text,) = Recording(1e3 * time, {"q_hip": angle}, "x").warnings
+    assert "if time is in milliseconds, say columns={'time': ColumnSource('time', unit='ms')}" in text
+    assert Recording(time, {"q_hip": angle}, "x").warnings == ()
+
+
+def test_a_slow_log_is_left_alone():
+    """Long ones of few samples a second, of a slow motion or one that rests nearly always; short slow ones."""
+    time = 0.1 * np.arange(36000)
+    turning = np.sin(0.03 * time)
+    assert Recording(time, {"q_hip": turning}, "x").warnings == ()
+    assert Recording(time, {"q_hip": np.clip(time - 1800.0, 0.0, 1.0)}, "x").warnings == ()
+    assert Recording(time[:5000], {"q_hip": 0.1 * turning[:5000]}, "x").warnings == ()
+    assert Recording(time, {"q_hip": np.full(36000, 0.2), "tau_motor_hip": turning}, "x").warnings == ()
+
+
 def test_gaps_coarse_time_and_wraps_are_reported():
     gap = Recording([0.0, 0.1, 0.2, 0.9, 1.0, 1.1], {}, "x")
     assert "1 gaps" in gap.warnings[0]
