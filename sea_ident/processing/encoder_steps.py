@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.motion import Motion
-from sea_ident.processing.harmonics import differentiate
+from sea_ident.processing.harmonics import differentiate, smoothed
 
 WHOLE = 0.02
 """How far a difference between two values may be from a whole number of steps [steps]."""
@@ -15,14 +15,25 @@ WHOLE = 0.02
 LEAST = 1e-6
 """Steps below this share of the range of a signal are digits of a file, or do not matter."""
 
-TOP = 0.875
-"""Share of the spectrum above which it is compared: lower down, the jerks of a motor at reversals repeat, too."""
+NOISE = np.linspace(0.0, 1.0, 201)
+"""Standard deviations of noise for which it is known what of the steps repeats [steps]; more of it leaves nothing."""
 
-FEWEST = 40
-"""Harmonics that are compared at least, where there are as many."""
+ORDERS = 1000
+"""Harmonics of the saw tooth that rounding adds to a position."""
 
-SURE = 5.0
-"""Standard deviations by which the mean must have more there than the scatter of the periods leaves."""
+STRETCHES = 32
+"""Parts of a period that each have their own scatter: what happens once, in one of them, says nothing of the others."""
+
+LEAST_SAMPLES = 16
+"""Samples in such a part at least."""
+
+COUNTS = 0.25
+"""Share of the power of the noise of the mean from which on what repeats counts, in the harmonics where it is [-]."""
+
+DRAWS = 8
+"""Other places of the steps, for the power of what they leave in the mean."""
+
+SEED = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +66,14 @@ class EncoderSteps:
     def joints(self) -> NDArray[np.bool_]:
         """(n,) joints with an encoder whose steps repeat."""
         return np.asarray((self.link_error > 0.0) | (self.motor_error > 0.0))
+
+    def link_power(self, stack: FloatArray) -> FloatArray:
+        """(N // 2, n) power of what repeats in the harmonics of the mean of q (P, N, n), from harmonic 1 on."""
+        return _power(stack.mean(axis=0), self.link, self.link_error)
+
+    def motor_power(self, stack: FloatArray) -> FloatArray:
+        """(N // 2, m) the same of theta (P, N, m) of the joints that have an encoder of it."""
+        return _power(stack.mean(axis=0), self.motor[self.elastic], self.motor_error[self.elastic])
 
     def words(self, joint_names: tuple[str, ...]) -> str:
         """Which encoders have steps that repeat, with numbers."""
@@ -92,8 +111,37 @@ def _errors(values: FloatArray, steps: FloatArray, errors: FloatArray, rng: np.r
     for i in np.flatnonzero(errors > 0.0):
         shifted = values[:, i] + rng.uniform(0.0, steps[i])
         rounded = np.round(shifted / steps[i]) * steps[i] - shifted
-        out[:, i] = rounded * (errors[i] / max(float(rounded.std()), 1e-300))
+        # noise makes the saw tooth smaller; one that is smaller from the start belongs to a joint that hardly moves
+        out[:, i] = rounded * min(errors[i] / max(float(rounded.std()), 1e-300), 1.0)
     return out
+
+
+def _power(mean: FloatArray, steps: FloatArray, errors: FloatArray) -> FloatArray:
+    """Power of what repeats in the harmonics of a mean over the periods.
+
+    Errors of rounding are white only where every sample is another step. Where a step lasts for many samples, they are
+    where the motion passes as many steps in a period as the harmonic has waves, and below. Rounded once more, to steps
+    that lie elsewhere, the motion has errors of about the same spectrum. It is taken from the harmonics that are larger
+    than steps can make them: rounding what is rounded already would change nothing.
+
+    Args:
+        mean: (N, n) positions [rad] or [m].
+        steps: (n,) of the encoders.
+        errors: (n,) standard deviation of what repeats.
+
+    Returns:
+        (N // 2, n) powers |c_l|^2, from harmonic 1 on.
+    """
+    samples = len(mean)
+    coefficients = np.fft.rfft(mean, axis=0)
+    moves = np.abs(coefficients / samples) ** 2 > 0.5 * errors**2
+    moves[0] = True
+    motion = np.fft.irfft(np.where(moves, coefficients, 0.0), samples, axis=0)
+    rng = np.random.default_rng(SEED)
+    draws = [_errors(motion, steps, errors, rng) for _ in range(DRAWS)]
+    power = np.mean([np.abs(np.fft.rfft(draw, axis=0)[1 : samples // 2 + 1] / samples) ** 2 for draw in draws], axis=0)
+    # the fastest motion for long has a peak of its own
+    return np.asarray(np.maximum(power, smoothed(power)), dtype=np.float64)
 
 
 def step_of(values: FloatArray) -> float:
@@ -138,15 +186,32 @@ def encoder_steps(
 
 
 def _repeated(stack: FloatArray, steps: FloatArray) -> FloatArray:
-    """(n,) standard deviation of what repeats, at most that of steps alone, from the top of the spectrum."""
+    """(n,) standard deviation of what repeats, from the scatter between the periods (P, N, n); 0 where it is little."""
     periods, samples, _ = stack.shape
-    most = samples // 2
-    first = max(min(int(TOP * most), most - FEWEST), 1)
-    coefficients = np.fft.rfft(stack, axis=1)[:, first : most + 1] / samples
-    mean = coefficients.mean(axis=0)
-    scatter = (np.abs(coefficients - mean) ** 2).sum(axis=0).mean(axis=0) / (periods * (periods - 1))
-    # powers of noise are exponentially distributed: their median is ln 2 of the mean, and scatters as mean / sqrt(L)
-    floor = np.median(np.abs(mean) ** 2, axis=0) / np.log(2.0)
-    limit = 1.0 + SURE / np.sqrt(len(mean))
-    variance = np.where(floor > limit * scatter, (floor - scatter) * samples, 0.0)
-    return np.asarray(np.sqrt(np.minimum(variance, steps**2 / 12.0)), dtype=np.float64)
+    scatter = stack.var(axis=0, ddof=1)
+    stretches = np.array_split(scatter, max(min(STRETCHES, samples // LEAST_SAMPLES), 1))
+    variances = np.stack([stretch.mean(axis=0) for stretch in stretches])
+    within, left = _left_by_noise()
+    errors = np.zeros_like(steps)
+    for i in np.flatnonzero(steps > 0.0):
+        errors[i] = steps[i] * np.sqrt(np.mean(np.interp(variances[:, i] / steps[i] ** 2, within, left, right=0.0)))
+    power = _power(stack.mean(axis=0), steps, errors)
+    total = power.sum(axis=0)
+    density = np.divide((power**2).sum(axis=0), total, out=np.zeros_like(total), where=total > 0.0)
+    noise = np.median(variances, axis=0) / (periods * samples)
+    return np.where(density > COUNTS * noise, errors, 0.0)
+
+
+def _left_by_noise() -> tuple[FloatArray, FloatArray]:
+    """Variances of one rounded position at one place of the period: between passes, and of the error of their mean.
+
+    Rounding adds a saw tooth of the position, whose variance is a twelfth of the square of a step. Noise shifts its
+    phase from pass to pass, which leaves exp(-2 (pi k sigma)^2) of its order k in the mean. Both variances together are
+    that of the noise and of the saw tooth.
+
+    Returns:
+        (K,) variances between passes and (K,) of what repeats, rising and falling with the noise [steps^2].
+    """
+    orders = np.arange(1, ORDERS + 1)[:, None]
+    left = np.sum(np.exp(-((2.0 * np.pi * orders * NOISE) ** 2)) / (2.0 * np.pi**2 * orders**2), axis=0)
+    return left[0] + NOISE**2 - left, left

@@ -27,14 +27,16 @@ FEWEST_AT_END = 6
 """Samples at least through which the end of a stretch of periods is laid."""
 
 
-def spectrum(stack: FloatArray) -> FloatArray:
+def spectrum(stack: FloatArray, repeated: FloatArray | None = None) -> FloatArray:
     """Power of the harmonics of the mean over the periods, and of its noise.
 
     The noise is the larger of what the scatter between periods says and of the floor of the mean's own spectrum:
-    quantisation repeats itself from period to period and is not seen in the scatter.
+    quantisation repeats itself from period to period and is not seen in the scatter. Steps that pass slowly for the
+    sample rate are not seen in the floor either: they are in the harmonics of the motion and not in the upper half.
 
     Args:
         stack: (P, N, n) signals of P periods.
+        repeated: (N // 2, n) powers of what steps of encoders leave in the mean, where they do not average out.
 
     Returns:
         (2, N // 2, n) powers |c_l|^2 of the mean, and of its noise, from harmonic 1 on.
@@ -49,16 +51,21 @@ def spectrum(stack: FloatArray) -> FloatArray:
     noise = np.broadcast_to(floor, power.shape).copy()
     if periods > 1:
         scatter = (np.abs(coefficients - mean) ** 2).sum(axis=0) / (periods * (periods - 1))
-        width = min(9, harmonics)
-        kernel = np.ones(width) / width
-        padded = np.pad(scatter, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
-        smooth = np.stack([np.convolve(padded[:, i], kernel, mode="valid") for i in range(scatter.shape[1])], axis=1)
-        noise = np.maximum(noise, smooth)
+        between = smoothed(scatter)
+        noise = np.maximum(noise, between if repeated is None else between + repeated)
     rounding = (1e-15 * np.abs(stack).max(axis=(0, 1))) ** 2
     return np.stack([power, np.maximum(noise, np.maximum(rounding, 1e-300))])
 
 
-def choose_harmonics(stack: FloatArray, most: int) -> int:
+def smoothed(powers: FloatArray) -> FloatArray:
+    """(L, n) means of the powers (L, n) of neighbouring harmonics."""
+    width = min(9, len(powers))
+    kernel = np.ones(width) / width
+    padded = np.pad(powers, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
+    return np.stack([np.convolve(padded[:, i], kernel, mode="valid") for i in range(powers.shape[1])], axis=1)
+
+
+def choose_harmonics(stack: FloatArray, most: int, repeated: FloatArray | None = None) -> int:
     """The number of harmonics that makes the error of the acceleration smallest.
 
     Every harmonic kept brings its noise, every harmonic left out its signal, both times the fourth power of its
@@ -67,15 +74,16 @@ def choose_harmonics(stack: FloatArray, most: int) -> int:
     Args:
         stack: (P, N, n) positions of P periods.
         most: largest number to choose.
+        repeated: (N // 2, n) powers of what steps of encoders leave in the mean, where they do not average out.
 
     Returns:
         Number of harmonics, at least 1, the largest over the signals.
     """
-    power, noise = spectrum(stack)[:, :most]
+    power, noise = spectrum(stack, repeated)[:, :most]
     return _cheapest(noise, _single_signal(power, noise))
 
 
-def choose_motor_harmonics(stack: FloatArray, most: int) -> int:
+def choose_motor_harmonics(stack: FloatArray, most: int, repeated: FloatArray | None = None) -> int:
     """The number of harmonics of motors, whose friction makes them jerk at every reversal.
 
     The tail of such a motion lies below the noise in every harmonic, and yet carries torque. As it repeats in every
@@ -87,15 +95,19 @@ def choose_motor_harmonics(stack: FloatArray, most: int) -> int:
     Args:
         stack: (P, N, n) positions of P periods.
         most: largest number to choose.
+        repeated: (N // 2, n) powers of what steps of encoders leave in the mean, where they do not average out.
 
     Returns:
         Number of harmonics, at least 1, the largest over the signals.
     """
     if len(stack) < FEWEST_PERIODS:
-        return choose_harmonics(stack, most)
-    power, noise = spectrum(stack)[:, :most]
+        return choose_harmonics(stack, most, repeated)
+    power, noise = spectrum(stack, repeated)[:, :most]
     single = _single_signal(power, noise)
-    tail = np.where(_averages_out(stack), _band_signal(power, noise, single == 0.0, len(stack)), 0.0)
+    white = _averages_out(stack)
+    if repeated is not None:
+        white &= ~np.any(repeated > 0.0, axis=0)
+    tail = np.where(white, _band_signal(power, noise, single == 0.0, len(stack)), 0.0)
     weight = np.where(np.any(tail != 0.0, axis=0), REPEATED, 1.0)
     return _cheapest(noise, weight * (single + tail))
 

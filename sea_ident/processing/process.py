@@ -236,10 +236,14 @@ def _periodic(
 
     most = max((cut.samples - 1) // 3, 1)
     elastic = robot.elastic_indices
-    links = link_harmonics or harmonics.choose_harmonics(cuts["q"], most)
+    steps = encoder_steps(signals.q, signals.theta, cuts["q"], cuts["theta"], elastic)
+    repeated = None if steps is None else steps.link_power(cuts["q"])
+    links = link_harmonics or harmonics.choose_harmonics(cuts["q"], most, repeated)
     motors = links
     if elastic.size:
-        motors = motor_harmonics or harmonics.choose_motor_harmonics(cuts["theta"][:, :, elastic], most)
+        theta = cuts["theta"][:, :, elastic]
+        repeated = None if steps is None else steps.motor_power(theta)
+        motors = motor_harmonics or harmonics.choose_motor_harmonics(theta, most, repeated)
     for label, number in (("link_harmonics", links), ("motor_harmonics", motors)):
         if not 1 <= number <= (cut.samples - 1) // 2:
             raise RecordingError(
@@ -271,7 +275,7 @@ def _periodic(
         places=tuple(keep),
         link_harmonics=int(links),
         motor_harmonics=int(motors),
-        encoder_steps=encoder_steps(signals.q, signals.theta, cuts["q"], cuts["theta"], elastic),
+        encoder_steps=steps,
         notes=tuple(notes),
         warnings=tuple(found),
         doubts=(*signals.doubts, *doubted),
