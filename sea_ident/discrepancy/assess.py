@@ -265,8 +265,9 @@ def _that_matters(bench: Bench, colours: ComplexArray, column: FloatArray, joint
 
 
 def _usual(effect: Effect) -> Effect:
-    """An effect with the shapes that its kind has where nothing is known of them."""
-    return replace(effect, **{shape.name: getattr(type(effect), shape.name) for shape in effect.shapes})
+    """An effect with the shapes that its kind has where nothing is known of them, at the speeds of the motion."""
+    pairs = zip(effect.shapes, effect.ranges, strict=True)
+    return replace(effect, **{s.name: getattr(type(effect), s.name) * (own.upper / s.upper) for s, own in pairs})
 
 
 def _beside_reversals(

@@ -234,7 +234,7 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
         anchored = bench.anchored((*fit.effects, effect), fit.parameters)[-1]
         if isinstance(anchored, SignalEffect):
             shown = [
-                bench.signal_tangent(anchored, amount, fit.effects, fit.parameters) for amount in anchored.ranges()
+                bench.signal_tangent(anchored, amount, fit.effects, fit.parameters) for amount in anchored.ranges
             ]
             variants: tuple[Effect, ...] = (anchored,)
             touched = np.arange(len(bench.data.equations))
@@ -328,7 +328,7 @@ def _exactly(
     if not _allowed(bench, fit, effect, values):
         values = _allowed_part(bench, effect, across, left) / size
     gain = float((across * size * values).sum(axis=1) @ left)
-    amounts = effect.ranges() if isinstance(effect, SignalEffect) else ()
+    amounts = effect.ranges if isinstance(effect, SignalEffect) else ()
     if amounts:
         held = {a.name: float(np.clip(v, a.lower, a.upper)) for a, v in zip(amounts, values, strict=True)}
         effect = replace(effect, **held)  # type: ignore[arg-type]

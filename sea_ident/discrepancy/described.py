@@ -133,7 +133,7 @@ def begin_as_described(
     if not any(columns[k].joint == effect.joint for k in held):
         return None
     flat = bench.whitening(None).flat
-    ranges = np.array([amount.upper - amount.lower for amount in effect.ranges()])
+    ranges = np.array([amount.upper - amount.lower for amount in effect.ranges])
     now = replace(effect, **{amount.name: 0.0 for amount in effect.amounts})  # type: ignore[arg-type]
     design = flat(bench.design((*before, now, *after)))
     values = described.copy()
@@ -145,7 +145,7 @@ def begin_as_described(
     for _ in range(MOST_ROUNDS):
         model = (*before, now, *after)
         parameters = {column.name: float(value) for column, value in zip(columns, values, strict=True)}
-        bent = [bench.signal_tangent(now, amount, model, parameters)[0] for amount in now.ranges()]
+        bent = [bench.signal_tangent(now, amount, model, parameters)[0] for amount in now.ranges]
         whole = np.concatenate([design, flat(np.stack(bent, axis=2)) * ranges], axis=1)
         weight = size / (DESCRIBED_WITHIN * np.abs(described[held]))
         known = np.zeros((len(held), whole.shape[1]))
@@ -166,6 +166,6 @@ def _moved(effect: SignalEffect, steps: FloatArray) -> SignalEffect:
     """The effect with its amounts changed, as far as their ranges allow."""
     values = {
         amount.name: float(np.clip(getattr(effect, amount.name) + step, amount.lower, amount.upper))
-        for amount, step in zip(effect.ranges(), steps, strict=True)
+        for amount, step in zip(effect.ranges, steps, strict=True)
     }
     return replace(effect, **values)  # type: ignore[arg-type]

@@ -84,8 +84,7 @@ def free_shapes(effects: Sequence[Effect]) -> tuple[tuple[int, Shape], ...]:
             stay = (*stay, "exponent")
         if isinstance(effect, AsymmetricSpring) and effect.kink != 0.0:
             stay = (*stay, "exponent")
-        shapes = effect.ranges() if isinstance(effect, SignalEffect) else effect.shapes
-        found.extend((position, shape) for shape in shapes if shape.name not in stay)
+        found.extend((position, shape) for shape in effect.ranges if shape.name not in stay)
     return tuple(found)
 
 

@@ -109,8 +109,8 @@ def at_a_bound(effect: Effect) -> bool:
     error of a sensor that is as large as any may be.
     """
     if isinstance(effect, SignalEffect):
-        return any(_at_an_end(float(getattr(effect, amount.name)), amount) for amount in effect.ranges())
-    for shape in effect.shapes:
+        return any(_at_an_end(float(getattr(effect, amount.name)), amount) for amount in effect.ranges)
+    for shape in effect.ranges:
         value = float(getattr(effect, shape.name))
         least, most = value < 1.02 * shape.lower, value > 0.98 * shape.upper
         if shape.name == "smoothing":

@@ -76,7 +76,7 @@ def refitted(
     begun = [effect, *effect.beginnings()]
     if isinstance(effect, Backlash):
         begun.append(_softened(bench, before, effect, after, noise, start))
-    if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.ranges()):
+    if isinstance(effect, SignalEffect) and any(_share(effect, a) > LARGE_AMOUNT for a in effect.ranges):
         smaller = {a.name: SMALLER * float(getattr(effect, a.name)) for a in effect.amounts}
         begun.append(replace(effect, **smaller))  # type: ignore[arg-type]
     fits: list[Fit] = []

@@ -188,12 +188,17 @@ class Effect(ABC):
         """The same effect with all the shapes that a search should try on this motion."""
         if not self.shapes:
             return (self,)
-        grids = [shape.grid() for shape in self.shapes]
-        names = [shape.name for shape in self.shapes]
+        own = self.on(state)
+        grids = [shape.grid() for shape in own.ranges]
+        names = [shape.name for shape in own.ranges]
         return tuple(
-            replace(self, **dict(zip(names, map(float, values), strict=True)))  # type: ignore[arg-type]
+            replace(own, **dict(zip(names, map(float, values), strict=True)))  # type: ignore[arg-type]
             for values in product(*grids)
         )
+
+    def on(self, state: State) -> Self:
+        """The same effect with the ranges that its shapes have on this motion; by default those of its kind."""
+        return self
 
     def beside(self) -> Self | None:
         """The same effect in another form, which can stand in a model beside this one; by default there is none.
@@ -242,6 +247,11 @@ class Effect(ABC):
     def title(self) -> str:
         """Name and joint, for people, and what tells it from another of its kind there."""
         return titled(self.name, self.joint)
+
+    @property
+    def ranges(self) -> tuple[Shape, ...]:
+        """Its shapes with the ranges of the motion that it was put on; by default those of its kind."""
+        return self.shapes
 
     @property
     def shape_values(self) -> dict[str, float]:

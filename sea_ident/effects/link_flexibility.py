@@ -66,6 +66,7 @@ class LinkFlexibility(SignalEffect):
             cubic_stiffness=ratio * (self.cubic_stiffness or 0.0),
         )
 
+    @property
     def ranges(self) -> tuple[Shape, ...]:
         """A compliance up to that of the spring before the encoder, where this is a soft one."""
         if self.stiffness is None or not self.stiffness > 0.0:

@@ -51,6 +51,7 @@ class SignalEffect(Effect):
         """(N, n) torques of the motors as they acted, from those recorded [N m] or [N]; the same by default."""
         return tau_motor
 
+    @property
     def ranges(self) -> tuple[Shape, ...]:
         """Its amounts with the ranges that they have beside the rest of the model; those of its kind by default."""
         return self.amounts

@@ -7,7 +7,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Anchor, Column, JointEffect, Shape, smooth_sign
-from sea_ident.effects.state import Side
+from sea_ident.effects.speeds import speed_scale
+from sea_ident.effects.state import Side, State
 from sea_ident.robot import Robot
 
 
@@ -20,11 +21,13 @@ class StribeckFriction(JointEffect):
         speed: Stribeck speed v_s [rad/s] or [m/s].
         exponent: a [-].
         smoothing: speed around which the sign is smoothed [rad/s] or [m/s].
+        scale: factor on the range of v_s that a motion of about 1 rad/s has [-].
     """
 
     speed: float = 0.1
     exponent: float = 2.0
     smoothing: float = 0.01
+    scale: float = 1.0
 
     name: ClassVar[str] = "stribeck_friction"
     side: ClassVar[Side] = Side.MOTOR
@@ -43,6 +46,16 @@ class StribeckFriction(JointEffect):
         """Sgn(theta') exp(-|theta' / v_s|^a)."""
         fade = np.exp(-(np.abs(dtheta / self.speed) ** self.exponent))
         return (smooth_sign(dtheta, self.smoothing) * fade)[:, None]
+
+    @property
+    def ranges(self) -> tuple[Shape, ...]:
+        """With the speeds of the motion: what falls below them is not seen, and above them it is Coulomb friction."""
+        speed, exponent = self.shapes
+        return replace(speed, lower=self.scale * speed.lower, upper=self.scale * speed.upper), exponent
+
+    def on(self, state: State) -> "StribeckFriction":
+        """With the scale of the motor's speed."""
+        return replace(self, scale=speed_scale(state, self.required_joint, state.motion.dtheta))
 
     def anchored(self, anchor: Anchor) -> "StribeckFriction":
         """With the smoothing of the model's Coulomb friction."""
