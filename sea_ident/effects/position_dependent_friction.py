@@ -28,7 +28,7 @@ class PositionDependentFriction(JointEffect):
     name: ClassVar[str] = "position_dependent_friction"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Armstrong-Helouvry, Control of Machines with Friction, 1991"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 2000.0),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 1e5),)
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """Sine and cosine."""

@@ -32,7 +32,7 @@ class TorqueRipple(JointEffect):
     name: ClassVar[str] = "torque_ripple"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Ghorbel, Gandhi, Alpeter, On the kinematic error in harmonic drive gears, 2001"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 2000.0),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 1e5),)
     depends_on: ClassVar[tuple[str, ...]] = ("theta",)
 
     def __post_init__(self) -> None:

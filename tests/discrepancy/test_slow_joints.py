@@ -67,6 +67,18 @@ def test_friction_that_falls_within_millimetres_per_second_is_found():
 
 
 @pytest.mark.scenario
+def test_a_wave_of_a_fine_screw_is_found_where_it_is():
+    """2.4 mm a turn: no turning joint has as many waves in a radian as this has in a metre."""
+    order = 2.0 * np.pi / 0.0024
+    _, found = searched("torque_ripple", [1.0, 0.0], order=order)
+    (ripple,) = found.effects
+    fit = found.final.fit
+    assert ripple.name == "torque_ripple"
+    assert np.log(ripple.order / order) == pytest.approx(0.0, abs=4.0 * std_of(fit, "order"))
+    assert fit.parameters["slider.torque_ripple_sine"] == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.scenario
 def test_what_friction_could_be_seen_is_said_of_speeds_that_the_slide_has():
     bench, found = searched("torque_offset", [1.0])
     fit, noise = found.final.fit, found.final.noise

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.free_shapes import room
 from sea_ident.effects import make_effect
 from sea_ident.effects.orders import highest_order, motors_too_fast, orders
 from sea_ident.effects.state import State
@@ -67,3 +68,17 @@ def test_the_highest_order_is_that_of_all_but_the_fastest_tenth(leg):
     speed[:1850] = 0.5
     slower = replace(state, motion=replace(state.motion, dtheta=speed))
     assert highest_order(slower, "hip") == pytest.approx(2.0 * highest_order(state, "hip"))
+
+
+@pytest.mark.filterwarnings("ignore:emps")
+@pytest.mark.parametrize("name", ["torque_ripple", "position_dependent_friction"])
+def test_a_fit_can_follow_every_wave_that_a_short_way_of_a_slide_shows_up_and_down(name):
+    slide = load_robot("emps")
+    time = 0.005 * np.arange(1000)
+    way = 0.015 * np.sin(0.4 * np.pi * time)[:, None]
+    state = State(slide, Motion.rigid(time, way, np.gradient(way, time, axis=0), np.zeros_like(way)))
+    variants = make_effect(name, "slider").variants(state)
+    assert max(one.order for one in variants) > 2500.0
+    for one in variants:
+        down, up = room(one, one.ranges[0])
+        assert down < 0.0 < up
