@@ -266,8 +266,9 @@ def _that_matters(bench: Bench, colours: ComplexArray, column: FloatArray, joint
 
 def _usual(effect: Effect) -> Effect:
     """An effect with the shapes that its kind has where nothing is known of them, at the speeds of the motion."""
-    pairs = zip(effect.shapes, effect.ranges, strict=True)
-    return replace(effect, **{s.name: getattr(type(effect), s.name) * (own.upper / s.upper) for s, own in pairs})
+    upper = {shape.name: shape.upper for shape in effect.ranges}
+    usual = {s.name: getattr(type(effect), s.name) * (upper[s.name] / s.upper) for s in effect.shapes}
+    return replace(effect, **usual)
 
 
 def _beside_reversals(

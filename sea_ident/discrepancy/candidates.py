@@ -233,9 +233,7 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
     try:
         anchored = bench.anchored((*fit.effects, effect), fit.parameters)[-1]
         if isinstance(anchored, SignalEffect):
-            shown = [
-                bench.signal_tangent(anchored, amount, fit.effects, fit.parameters) for amount in anchored.ranges
-            ]
+            shown = [bench.signal_tangent(anchored, amount, fit.effects, fit.parameters) for amount in anchored.ranges]
             variants: tuple[Effect, ...] = (anchored,)
             touched = np.arange(len(bench.data.equations))
             spectra = np.stack([torque for torque, _ in shown], axis=-1)[:, :, None, :]

@@ -269,7 +269,7 @@ def test_a_dead_channel_is_refused_in_either_recording(model, intact, column):
 def test_time_in_milliseconds_is_refused_in_either_recording(model, intact):
     late = Recording(1e3 * intact.time, intact.columns, "ms.csv")
     for recordings in ((late, None), (intact, late)):
-        with pytest.raises(DiagnosisError, match="ms.csv: no position moves faster"):
+        with pytest.raises(DiagnosisError, match=r"ms\.csv: no position moves faster"):
             quietly(model, recordings[0], holdout=recordings[1])
 
 
