@@ -251,7 +251,8 @@ class Bench(ParameterFits):
 
     def _step_errors(self, fit: Fit, others: Periods) -> ComplexArray:
         """(K, H + 1, E) what the residual of a fit changes by where the steps of encoders lie elsewhere."""
-        return np.asarray(others.residuals(fit) - fit.scale * fit.residual, dtype=np.complex128)
+        changes = others.residuals(fit) - fit.scale * fit.residual
+        return np.asarray(changes / np.sqrt(len(changes)), dtype=np.complex128)
 
     def noise_of_cut(self, fit: Fit) -> NoiseFloor:
         """The same by periods as they are cut, which do not close: to compare these with one another."""

@@ -36,13 +36,15 @@ STATES_KEPT = 6
 def with_other_steps(data: PeriodData) -> PeriodData | None:
     """Its mean with steps of the encoders that lie elsewhere, as periods of a recording; None where they average out.
 
-    What these periods differ by is what such steps do to a torque, and are the same in every period of the recording.
+    What these periods differ by is what such steps do to a torque, in every period of the recording alike, times the
+    root of their number: periods are compared at that part of their distance from the mean.
     """
     if data.step_errors is None:
         return None
+    size = np.sqrt(len(data.step_errors))
     return replace(
         data,
-        period_motions=tuple(data.motion.plus(errors) for errors in data.step_errors),
+        period_motions=tuple(data.motion.plus(size * errors) for errors in data.step_errors),
         period_tau_motor=np.stack([data.tau_motor] * len(data.step_errors)),
         places=(),
         step_errors=None,

@@ -23,8 +23,8 @@ MORE_ROUNDS = 8
 """Rounds more that a noise floor and a fit may take where steps of encoders, which a fit weighs by its inertias, make
 up most of the floor, ..."""
 
-CONSISTENT = 1.1
-"""... until the floor has about what the fit makes of these steps: their share of it cannot be more than one [-]."""
+CONSISTENT = 1.0
+"""... until the floor has about what the fit makes of these steps: their share of it is one at most [-]."""
 
 COMMON = 2.5
 """... or they change by less than this factor: as much as one motor may differ from another."""
