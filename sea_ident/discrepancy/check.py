@@ -162,7 +162,7 @@ def wrong_columns(robot: Robot, effects: Sequence[Effect], processed: ProcessedR
 
     Args:
         robot: the robot.
-        effects: the model, without its springs.
+        effects: the model.
         processed: the recording, of two periods or more.
 
     Returns:

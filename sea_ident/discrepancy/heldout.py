@@ -20,7 +20,6 @@ from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_rev
 from sea_ident.discrepancy.transfer import Transfer, far_behind, transfer
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
-from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.doubt import DoubtKind, texts_of
@@ -122,11 +121,10 @@ def held_out(
     holdout = processed.used_of(holdout)
     data, findings = check.cleaned(period_data(processed, bench.robot), holdout)
     warnings = [f"held-out data: {text}" for text in findings.warnings]
-    misplaced = misplaced_columns(bench.robot, bench.effects, processed)
-    if misplaced is not None:
-        warnings.append(f"held-out data: {misplaced}")
+    wrong = check.wrong_columns(bench.robot, bench.effects, processed)
+    warnings.extend(f"held-out data: {text}" for text in wrong)
     doubted = bool(texts_of(processed.doubts, DoubtKind.POSITION))
-    if findings.fatal or data.periods < 2 or misplaced is not None or doubted:
+    if findings.fatal or data.periods < 2 or wrong or doubted:
         warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")
         return other_periods(bench, selection), tuple(warnings)
     if bench.data.caution > data.caution:

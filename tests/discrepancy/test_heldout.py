@@ -55,6 +55,14 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     assert power[1] < 0.3 * power[0]
 
 
+def test_nothing_is_tested_on_a_torque_of_the_wrong_sign(ripple, with_ripple):
+    kind = "current_ankle"
+    found, said = held_out(*ripple, with_ripple.replace_columns({kind: -with_ripple.columns[kind]}))
+    assert found.kind is Kind.OTHER_PERIODS
+    assert any(text.startswith("held-out data: ") and "'ankle' moves comes out negative" in text for text in said)
+    assert any("cannot be used; nothing was tested on it" in text for text in said)
+
+
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_rest_after_either_recording_is_in_nothing_that_is_looked_at(leg, laboratory, ripple, with_ripple, monkeypatch):
     """What is read beside the periods is read from the same part of a recording: its end is theirs."""
