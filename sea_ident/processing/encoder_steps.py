@@ -22,7 +22,7 @@ ORDERS = 1000
 """Harmonics of the saw tooth that rounding adds to a position."""
 
 STRETCHES = 32
-"""Parts of a period that each have their own scatter: what happens once, in one of them, says nothing of the others."""
+"""Parts of a period that each have their own scatter: what is restless in one of them says nothing of the others."""
 
 LEAST_SAMPLES = 16
 """Samples in such a part at least."""
@@ -188,9 +188,11 @@ def encoder_steps(
 def _repeated(stack: FloatArray, steps: FloatArray) -> FloatArray:
     """(n,) standard deviation of what repeats, from the scatter between the periods (P, N, n); 0 where it is little."""
     periods, samples, _ = stack.shape
-    scatter = stack.var(axis=0, ddof=1)
-    stretches = np.array_split(scatter, max(min(STRETCHES, samples // LEAST_SAMPLES), 1))
-    variances = np.stack([stretch.mean(axis=0) for stretch in stretches])
+    # about half the recording apart, periods differ by all that drifts, and by an odd number by what comes in turn; the
+    # median leaves out one that stands alone
+    apart = 0.5 * (stack - np.roll(stack, periods // 2 | 1, axis=0)) ** 2
+    stretches = np.array_split(apart, max(min(STRETCHES, samples // LEAST_SAMPLES), 1), axis=1)
+    variances = np.stack([np.median(stretch.mean(axis=1), axis=0) for stretch in stretches])
     within, left = _left_by_noise()
     errors = np.zeros_like(steps)
     for i in np.flatnonzero(steps > 0.0):

@@ -62,13 +62,36 @@ def test_steps_in_much_noise_do_not_repeat(rate):
     assert steps_in(read(moving(rate), 2.0 * np.pi / 2**12, 0.5)) is None
 
 
-def test_what_happens_once_hides_no_steps():
-    """In a part of one period the motion departs by many steps, as where it is held."""
+@pytest.mark.parametrize("held", [1000, 10000], ids=["a part of a period", "a period"])
+def test_what_happens_once_hides_no_steps(held):
+    """The motion stops before the end of the recording, many steps away from where it should be."""
     motion, step = moving(1000), 2.0 * np.pi / 2**12
     stack = read(motion, step, 0.05)
-    stack[-1, -1000:] = stack[-1, -1000]
-    usual = steps_in(read(motion, step, 0.05)).link_error[0]
-    assert steps_in(stack).link_error[0] == pytest.approx(usual, rel=0.1)
+    usual = steps_in(stack).link_error[0]
+    stack[-1, -held:] = stack[-1, -held]
+    assert steps_in(stack).link_error[0] == pytest.approx(usual, rel=0.02)
+
+
+def test_a_part_in_which_periods_differ_hides_no_steps_elsewhere():
+    """Where friction holds a joint, periods may differ by many steps, and repeat to the step where it moves."""
+    motion, step = moving(1000), 2.0 * np.pi / 2**12
+    counts = read(motion / step, 1.0, 0.05)
+    usual = steps_in(step * counts).link_error[0]
+    counts[:, -1000:] += np.random.default_rng(4).integers(-10, 10, (PERIODS, 1, 1))
+    assert steps_in(step * counts).link_error[0] == pytest.approx(np.sqrt(0.9) * usual, rel=0.05)
+
+
+def test_periods_that_differ_in_turn_repeat_no_steps():
+    """Where half the period is taken for it."""
+    motion, step = moving(1000), 2.0 * np.pi / 2**12
+    assert steps_in(read(motion, step, 0.05).reshape(2 * PERIODS, -1, 1)) is None
+
+
+def test_steps_average_out_where_the_motion_drifts_across_them():
+    motion, step = moving(1000), 2.0 * np.pi / 2**12
+    drifts = np.linspace(0.0, 4.0, PERIODS)[:, None] * step
+    counts = np.round((motion + drifts) / step + 0.05 * np.random.default_rng(1).standard_normal((PERIODS, 10000)))
+    assert steps_in(step * counts[:, :, None]) is None
 
 
 def test_a_joint_that_rests_between_two_steps_has_none_that_repeat():
