@@ -1,4 +1,4 @@
-"""Checks at the border: recordings that prove nothing, clipped channels, spikes."""
+"""Checks at the border: recordings that prove nothing, clipped channels, spikes, pauses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.closing import mean_of_periods
+from sea_ident.discrepancy.closing import SIGNALS, mean_of_periods
 from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import Effect
@@ -36,6 +36,12 @@ SPIKE = 8.0
 
 SPIKE_DISTANCE = 6
 """Samples around a reversal in which no spike is looked for."""
+
+AWAY = 0.05
+"""Share of the rms of a position from which on it is away from that of the other periods [-], ..."""
+
+LASTS = 0.05
+"""... and share of a period that it is away more than usual where the motion is another: spikes are shorter [-]."""
 
 
 @dataclass(frozen=True)
@@ -217,22 +223,15 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
             "period of this motion. Give the period that was excited (period=, or --period of identify)"
         )
         fatal = True
-    spiked = _spiked_periods(data)
-    if spiked:
-        keep = [p for p in range(data.periods) if p not in spiked]
-        where = ", ".join(str(p + 1) for p in sorted(spiked)[:8])
-        if len(keep) >= max(2, data.periods // 2):
-            warnings.append(
-                f"{data.source}: spikes in period(s) {where} of {data.periods}, far outside what the other periods "
-                "show; these periods were left out. Check the wiring of the sensor"
-            )
+    odd = _spiked_periods(data)
+    if odd:
+        keep = [p for p in range(data.periods) if p not in odd]
+        few = len(keep) >= max(2, data.periods // 2)
+        other = odd & _another_motion(data)
+        warnings.extend(_words_of_odd(data, odd - other, other, few))
+        if few:
             data = subset(data, keep)
-        else:
-            warnings.append(
-                f"{data.source}: spikes in {len(spiked)} of {data.periods} periods ({where}): too many to leave out. "
-                "Repair the sensor and record again"
-            )
-            fatal = True
+        fatal = fatal or not few
     clipped = _clipped(data.period_tau_motor)
     if not isinstance(recording, ProcessedRecording):
         # the gear's efficiency turns one limit of a current into two of the torque
@@ -261,16 +260,22 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
 def _spiked_periods(data: PeriodData) -> set[int]:
     """Periods with a sample far from its neighbours, farther than any sample of a usual period.
 
-    Reversals are left aside: what happens there differs from pass to pass by itself.
+    Reversals are left aside: what happens there differs from pass to pass by itself. Where steps of an encoder repeat,
+    usual periods may be the same to the last step, and one that falls a sample later is no spike.
     """
     if data.periods < 4:
         return set()
     out: set[int] = set()
-    accelerations = [np.stack([getattr(m, kind) for m in data.period_motions]) for kind in ("ddq", "ddtheta")]
+    kinds = ("ddq", "ddtheta")
+    accelerations = [np.stack([getattr(m, kind) for m in data.period_motions]) for kind in kinds]
+    none = np.zeros(data.robot.n)
+    steps = [none, none]
+    if data.step_errors is not None:
+        steps = [np.sqrt(np.mean(data.step_errors[:, SIGNALS.index(kind)] ** 2, axis=(0, 1))) for kind in kinds]
     torque = np.diff(
         data.period_tau_motor, n=2, axis=1, prepend=data.period_tau_motor[:, -1:], append=data.period_tau_motor[:, :1]
     )
-    for stack in (torque, *accelerations):
+    for stack, least in zip((torque, *accelerations), (none, *steps), strict=True):
         for i in range(data.robot.n):
             away = np.ones(data.samples, dtype=np.bool_)
             for e, equation in enumerate(data.equations):
@@ -280,8 +285,50 @@ def _spiked_periods(data: PeriodData) -> set[int]:
             if np.count_nonzero(away) < 16:
                 continue
             largest = np.max(np.abs(stack[:, away, i] - np.median(stack[:, away, i], axis=0)), axis=1)
-            out |= {int(p) for p in np.flatnonzero(largest > SPIKE * np.median(largest))}
+            out |= {int(p) for p in np.flatnonzero(largest > SPIKE * max(np.median(largest), least[i]))}
     return out
+
+
+def _another_motion(data: PeriodData) -> set[int]:
+    """Periods in which a position is away from that of the others for long, as where the motion stops."""
+    out: set[int] = set()
+    for kind in ("q", "theta"):
+        stack = np.stack([getattr(m, kind) for m in data.period_motions])
+        usual = np.median(stack, axis=0)
+        share = np.mean(np.abs(stack - usual) > AWAY * usual.std(axis=0), axis=1)
+        out |= {int(p) for p in np.flatnonzero(np.any(share > LASTS + np.median(share, axis=0), axis=1))}
+    return out
+
+
+def _words_of_odd(data: PeriodData, spiked: set[int], other: set[int], few: bool) -> list[str]:
+    """What is said of periods with spikes and of those with another motion, few enough to be left out or not."""
+    found = []
+    for periods, what, why, remedies in (
+        (
+            spiked,
+            "spikes",
+            "far outside what the other periods show",
+            ("Check the wiring of the sensor", "Repair the sensor and record again"),
+        ),
+        (
+            other,
+            "the motion stops or differs",
+            "where its position is away from that of the other periods for long",
+            ("Cut the recording to where the motion repeats itself",) * 2,
+        ),
+    ):
+        where = ", ".join(str(p + 1) for p in sorted(periods)[:8])
+        if periods and few:
+            found.append(
+                f"{data.source}: {what} in period(s) {where} of {data.periods}, {why}; these periods were left out. "
+                f"{remedies[0]}"
+            )
+        elif periods:
+            found.append(
+                f"{data.source}: {what} in {len(periods)} of {data.periods} periods ({where}): too many to leave out. "
+                f"{remedies[1]}"
+            )
+    return found
 
 
 def subset(data: PeriodData, keep: list[int]) -> PeriodData:

@@ -1,13 +1,90 @@
 """Checks at the border of the diagnosis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from estimation.synthetic import leg_series, record, truth_of
 
-from sea_ident.discrepancy.check import Findings, channels_move, clock_in_seconds, drowned
+from sea_ident.discrepancy.check import Findings, channels_move, cleaned, clock_in_seconds, drowned
+from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording
 from sea_ident.robot import load_robot
+
+STEP = 2.0 * np.pi / 2**14
+PERIOD = 10.0
+
+
+@pytest.fixture(scope="module")
+def counted(leg):
+    """Eight periods read by encoders of 14 bits with next to no noise: the same to a step that falls a sample later."""
+    fine = record(leg, truth_of(leg, leg_series(), samples=1000), 8, torque_noise=0.05, encoder_noise=3e-5 * STEP)
+    columns = {
+        name: np.round(values / STEP) * STEP if name.startswith(("q_", "theta_")) else values
+        for name, values in fine.columns.items()
+    }
+    return Recording(fine.time, columns, "counted")
+
+
+def said_of(recording, leg, **columns):
+    """Periods that are kept, counted from 1, and what is said of the others."""
+    changed = Recording(recording.time, {**recording.columns, **columns}, "changed")
+    data, findings = cleaned(period_data(wide_processing(changed, leg, PERIOD), leg), changed)
+    return [place + 1 for place in data.places], [text for text in findings.warnings if "left out" in text]
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_step_that_falls_a_sample_later_is_no_spike(counted, leg):
+    assert said_of(counted, leg) == ([1, 2, 3, 4, 5, 6, 7, 8], [])
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+@pytest.mark.parametrize("column", ["q_knee", "theta_ankle"])
+def test_a_spike_of_some_steps_is_one(counted, leg, column):
+    values = counted.columns[column].copy()
+    values[2340] += 30.0 * STEP
+    kept, said = said_of(counted, leg, **{column: values})
+    assert kept == [1, 2, 4, 5, 6, 7, 8]
+    assert said == [
+        "changed: spikes in period(s) 3 of 8, far outside what the other periods show; these periods were left out. "
+        "Check the wiring of the sensor"
+    ]
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_motion_that_stops_is_no_spike(counted, leg):
+    columns = {name: values.copy() for name, values in counted.columns.items()}
+    for values in columns.values():
+        values[7600:] = values[7600]
+    columns["q_knee"][2340] += 30.0 * STEP
+    kept, said = said_of(counted, leg, **columns)
+    assert kept == [1, 2, 4, 5, 6, 7]
+    assert "spikes in period(s) 3 of 8" in said[0]
+    assert said[1] == (
+        "changed: the motion stops or differs in period(s) 8 of 8, where its position is away from that of the other "
+        "periods for long; these periods were left out. Cut the recording to where the motion repeats itself"
+    )
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_motion_that_stops_too_often_lets_nothing_be_told(counted, leg):
+    """Each joint stops in a few of the periods, one or the other in most of them."""
+    data = period_data(wide_processing(counted, leg, PERIOD), leg)
+    motions = list(data.period_motions)
+    for period, joint in ((0, 0), (2, 0), (4, 1), (6, 1), (7, 2)):
+        q, ddq = motions[period].q.copy(), motions[period].ddq.copy()
+        q[600:, joint] = q[600, joint]
+        ddq[600, joint] = 1e4
+        motions[period] = replace(motions[period], q=q, ddq=ddq)
+    data, findings = cleaned(replace(data, period_motions=tuple(motions)), counted)
+    assert data.periods == 8
+    assert findings.fatal
+    assert findings.warnings[-1] == (
+        "counted: the motion stops or differs in 5 of 8 periods (1, 3, 5, 7, 8): too many to leave out. Cut the "
+        "recording to where the motion repeats itself"
+    )
 
 
 def test_noise_beyond_the_torque_lets_nothing_be_told():
