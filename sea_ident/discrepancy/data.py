@@ -327,13 +327,7 @@ def around_reversals(
     There a sample falls on one or the other side of a jump (of friction, of the efficiency of the gear) by a velocity
     that is known no better than to its sign: no model of the mean can be right.
 
-    Args:
-        motion: (N, n) mean motion.
-        equations: E.
-        periods: motions of the periods, whose scatter blurs the sign of a speed, ...
-        errors: ... and errors (K, 6, N, n) of the mean that are in all of them.
-        samples: left out to either side of a reversal.
-        uncertain: times that a speed must exceed its scatter [-].
+    The scatter of the periods blurs a sign, and so do errors (K, 6, N, n) of the mean that are in all of them.
     """
     left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):

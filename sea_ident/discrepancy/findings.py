@@ -1,7 +1,7 @@
 """The parts of a diagnosis."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -214,7 +214,12 @@ class Gap:
     @property
     def largest(self) -> str:
         """The joint where the gap was largest, beside its noise where units differ."""
-        return list(self.before)[int(np.argmax(self._comparable(self.before)))]
+        return self.largest_of(list(self.before))
+
+    def largest_of(self, joints: Sequence[str]) -> str:
+        """The same among some joints."""
+        sizes = dict(zip(self.before, self._comparable(self.before), strict=True))
+        return max(joints, key=lambda joint: float(sizes[joint]))
 
     @property
     def mixed(self) -> bool:

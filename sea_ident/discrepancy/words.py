@@ -1,6 +1,6 @@
 """A diagnosis in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sea_ident.discrepancy.breakaway import Breakaway
@@ -78,7 +78,7 @@ def paragraph(facts: Facts) -> str:
         if all((m.effect, m.joint) in drifting for m in facts.added):
             parts.append("It shows in the comparison of the periods; the mean over all of them hides it.")
         else:
-            parts.append(_gap_sentence(facts.gap, facts.units))
+            parts.append(_gap_sentence(facts.gap, facts.units, [m.joint for m in facts.missing if m.joint is not None]))
             if facts.held is not None:
                 parts.append(_held_sentence(facts))
     if facts.remainder > 0.0 and facts.verdict is not Verdict.NONE:
@@ -134,9 +134,13 @@ def stiction(found: Breakaway, unit: str) -> str:
     )
 
 
-def _gap_sentence(gap: Gap, units: Mapping[str, str]) -> str:
-    """The gap on the recording, where it was largest; where it is below the noise, what that means."""
-    worst = gap.largest
+def _gap_sentence(gap: Gap, units: Mapping[str, str], named: Sequence[str] = ()) -> str:
+    """The gap on the recording: at the joints of what is named, where there was one, and of these where it was largest.
+
+    Where it is below the noise in every joint, what that means.
+    """
+    there = [joint for joint in gap.before if joint in named and gap.before[joint] > 0.0]
+    worst = gap.largest_of(there) if there else gap.largest
     if gap.before[worst] <= 0.0:
         return (
             "It is smaller than the noise of the mean torque in every joint: the pattern over the period shows it, the "
@@ -144,8 +148,8 @@ def _gap_sentence(gap: Gap, units: Mapping[str, str]) -> str:
         )
     after, unit = gap.after[worst], units[worst]
     to = f"to {after:.3g} {unit}" if after > 0.0 else f"to nothing beyond the noise ({gap.noise[worst]:.2g} {unit})"
-    where = "where it was largest" + (" beside its noise" if gap.mixed else "")
-    return f"With it the gap on this recording goes from {gap.before[worst]:.3g} {to} at {worst}, {where}."
+    where = ", where it was largest" + (" beside its noise" if gap.mixed else "") if worst == gap.largest else ""
+    return f"With it the gap on this recording goes from {gap.before[worst]:.3g} {to} at {worst}{where}."
 
 
 def _held_sentence(facts: Facts) -> str:
@@ -231,6 +235,11 @@ def _opening(facts: Facts) -> str:
             return (
                 f"Nothing is named: model and data disagree beyond the noise (p {chance(facts.p_value)}) by "
                 f"{_percent(facts.remainder)} of the torque, and no effect explains enough of that."
+            )
+        case Verdict.NONE if facts.p_value < DISAGREES:
+            return (
+                f"Nothing is named: model and data disagree beyond the noise (p {chance(facts.p_value)}), but the "
+                "residual of no equation is larger than its noise."
             )
         case Verdict.NONE:
             return (

@@ -24,6 +24,18 @@ def test_the_gap_of_a_slide_is_a_force():
     assert "to 0.1 N m at turn" in _gap_sentence(turned, units)
 
 
+def test_the_gap_is_told_where_what_is_named_acts():
+    """Not where something else is left, at which the named effect does nothing."""
+    units = dict.fromkeys(("yaw", "roll", "lift"), "N m")
+    sizes = {"yaw": 0.0174, "roll": 0.0039, "lift": 0.001}, {"yaw": 0.0157, "roll": 0.0003, "lift": 0.001}
+    gap = Gap(*sizes, dict.fromkeys(units, 0.01), units)
+    assert _gap_sentence(gap, units, ["roll"]).endswith("goes from 0.0039 to 0.0003 N m at roll.")
+    assert _gap_sentence(gap, units, ["lift", "roll"]).endswith("at roll.")
+    # a tilt acts at no joint, and what shows at others only is told there
+    for named in ([], ["other"], ["yaw", "roll"]):
+        assert _gap_sentence(gap, units, named).endswith("to 0.0157 N m at yaw, where it was largest.")
+
+
 def test_forces_and_torques_are_compared_beside_their_noise():
     sizes = {"lift": 2.0, "turn": 0.5}, {"lift": 0.0, "turn": 0.1}, {"lift": 0.4, "turn": 0.02}
     mixed, alike = {"lift": "N", "turn": "N m"}, {"lift": "N m", "turn": "N m"}
@@ -113,6 +125,10 @@ def test_no_probability_is_zero_and_no_percentage_a_power_of_ten():
 def test_where_nothing_that_matters_is_missing_a_disagreement_is_said():
     nothing = replace(facts(Verdict.NONE, p_value=0.3), missing=())
     assert paragraph(nothing).startswith("Nothing is missing that 12 periods could show (lack of fit p = 0.3).")
+    # the equations of a joint may disagree together and not one by one
+    rejected = paragraph(replace(nothing, p_value=1e-56))
+    assert rejected.startswith("Nothing is named: model and data disagree beyond the noise (p = 1e-56)")
+    assert "Nothing is missing" not in rejected
     told = paragraph(replace(nothing, p_value=0.0, remainder=0.0028))
     assert told.startswith("Nothing is named: model and data disagree beyond the noise (p < 1e-300)")
     assert "by 0.28 % of the torque" in told
