@@ -44,7 +44,7 @@ def limits(bench: Bench, settled: Settled, steps: EncoderSteps | None) -> tuple[
     Returns:
         What a user should know, and whether what has no name may be that.
     """
-    found: list[str] = []
+    found, springs = list[str](), hardly_deflected(bench.data)
     share = bench.share_of_steps(settled.fit, settled.noise)
     if steps is not None and share > WORTH_A_WORD:
         found.append(
@@ -53,8 +53,7 @@ def limits(bench: Bench, settled: Settled, steps: EncoderSteps | None) -> tuple[
             f"{100.0 * min(share, 1.0):.0f} % of it; smaller effects are not seen. Finer encoders, or motion that "
             "differs a little from period to period, make it less"
         )
-    found.extend(hardly_deflected(bench.data))
-    return tuple(found), share > MOST or bool(hardly_deflected(bench.data))
+    return (*found, *springs), share > MOST or bool(springs)
 
 
 def hardly_deflected(data: PeriodData) -> tuple[str, ...]:
