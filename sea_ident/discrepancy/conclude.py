@@ -24,7 +24,7 @@ from sea_ident.discrepancy.findings import (
     Waveforms,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import gap_of, torque_by_joint
+from sea_ident.discrepancy.gap import gap_of, noise_of_residual, torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
@@ -368,10 +368,11 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
 
 def _per_joint(bench: Bench, settled: Settled) -> dict[str, dict[str, float]]:
     """Energy of the residual over that of the noise by joint and equation."""
-    clean, noise = np.sum(np.abs(bench.clean_residual(settled.fit)) ** 2, axis=0), settled.noise
+    clean = np.sum(np.abs(bench.clean_residual(settled.fit)) ** 2, axis=0)
+    noise = noise_of_residual(settled.fit, settled.noise)
     out: dict[str, dict[str, float]] = {joint: {} for joint in bench.robot.joint_names}
     for e, equation in enumerate(bench.data.equations):
-        out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise.std[e] ** 2, 1e-300))
+        out[equation.joint][str(equation.kind)] = float(clean[e] / max(noise[e] ** 2, 1e-300))
     return out
 
 
@@ -390,7 +391,7 @@ def _waveforms(bench: Bench, before: Fit, after: Fit, noise: NoiseFloor, selecti
         equations=labels,
         before=waveform(bench.clean_residual(before), data.samples),
         after=waveform(bench.clean_residual(after), data.samples),
-        noise=noise.std,
+        noise=noise_of_residual(after, noise),
         q=data.motion.q,
         dtheta=data.motion.dtheta,
         deflection=data.motion.deflection,

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import stats
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.gap import excess_power
+from sea_ident.discrepancy.gap import excess_power, excess_power_of_sums
 from sea_ident.discrepancy.judge import flat_steps
 from sea_ident.discrepancy.noise import closed_directions, closed_freedom_of_many
 from sea_ident.discrepancy.settle import Settled
@@ -39,6 +39,10 @@ def lack_of_fit(bench: Bench, settled: Settled) -> tuple[float, int, float]:
 
 
 def remainder_share(bench: Bench, settled: Settled) -> float:
-    """Rms of what a fit leaves beyond noise, as a share of the rms torque there: the largest of all."""
-    excess = np.sqrt(excess_power(bench, settled.fit, settled.noise))
+    """Rms of what a fit leaves beyond noise in an equation or in the sum of those of a joint.
+
+    As a share of the rms torque there: the largest of all.
+    """
+    alone, together = (power(bench, settled.fit, settled.noise) for power in (excess_power, excess_power_of_sums))
+    excess = np.sqrt(np.maximum(alone, together))
     return float(np.max(excess / np.maximum(bench.torque_rms, 1e-300)))

@@ -9,6 +9,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import EquationKind, waveform
 from sea_ident.discrepancy.findings import Location
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.gap import noise_of_residual
 from sea_ident.discrepancy.noise import NoiseFloor, closed_directions, closed_freedom_of_many, stacked, unstacked
 
 SIGNIFICANT = 5.0
@@ -26,7 +27,7 @@ def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
     """
     data = bench.data
     residual = waveform(bench.clean_residual(fit), data.samples)
-    scatter = _scatter(bench, fit, noise)
+    scatter, size = _scatter(bench, fit, noise), noise_of_residual(fit, noise)
     found = []
     numbers = 2 * data.harmonics + 1
     for e, equation in enumerate(data.equations):
@@ -37,7 +38,7 @@ def locate(bench: Bench, fit: Fit, noise: NoiseFloor) -> tuple[Location, ...]:
             count = numbers * float(np.count_nonzero(part)) / data.samples
             if count < 4.0:
                 continue
-            variance, own = float(noise.std[e] ** 2), scatter[:, part, e]
+            variance, own = float(size[e] ** 2), scatter[:, part, e]
             if len(own):
                 variance = max(variance, float(np.mean(own**2)) / data.averaged)
             power = float(np.mean(residual[part, e] ** 2))

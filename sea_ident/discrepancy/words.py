@@ -8,6 +8,7 @@ from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
+from sea_ident.discrepancy.lack import LACK_LEVEL
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
@@ -21,9 +22,6 @@ STANDS_LONG = 0.1
 
 UNSOUND = "Something is wrong with this recording (the warnings say what), so that nothing can be concluded."
 """What is said of a recording that allows no conclusion."""
-
-DISAGREES = 1e-3
-"""Probability of the lack of fit by noise below which model and data are said to disagree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,10 +234,10 @@ def _opening(facts: Facts) -> str:
                 f"Nothing is named: model and data disagree beyond the noise (p {chance(facts.p_value)}) by "
                 f"{_percent(facts.remainder)} of the torque, and no effect explains enough of that."
             )
-        case Verdict.NONE if facts.p_value < DISAGREES:
+        case Verdict.NONE if facts.p_value < LACK_LEVEL:
             return (
-                f"Nothing is named: model and data disagree beyond the noise (p {chance(facts.p_value)}), but the "
-                "residual of no equation is larger than its noise."
+                f"Nothing is named: model and data disagree beyond the noise (p {chance(facts.p_value)}), but by less "
+                "than the noise of the mean torque in every joint, and no effect explains enough of that."
             )
         case Verdict.NONE:
             return (
@@ -277,7 +275,7 @@ def _opening(facts: Facts) -> str:
             return f"The model fits, but its parameters are not those of the reference. What changed: {changed}."
         case _ if not facts.sound:
             return UNSOUND
-        case _ if facts.p_value < DISAGREES:
+        case _ if facts.p_value < LACK_LEVEL:
             return (
                 f"Model and data disagree beyond the noise (p {chance(facts.p_value)}), but {facts.periods} periods of "
                 "this recording do not tell by what."

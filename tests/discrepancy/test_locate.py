@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.conclude import _per_joint
 from sea_ident.discrepancy.data import spectrum
-from sea_ident.discrepancy.gap import excess_power, gap_of, per_joint
+from sea_ident.discrepancy.gap import excess_power, gap_of, noise_of_residual, per_joint
 from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate, regimes
 from sea_ident.discrepancy.settle import Settled
@@ -127,6 +128,37 @@ def test_excess_is_what_was_put_there(nothing_missing):
     assert share == pytest.approx(np.max(power / bench.torque_rms))
 
 
+def test_what_the_noise_of_a_deflection_hides_shows_in_the_sum(nothing_missing):
+    bench, now = nothing_missing
+    pair = np.zeros(len(bench.data.equations))
+    pair[[index(bench, "ankle", "motor"), index(bench, "ankle", "link")]] = 1.0, -1.0
+    covariance = now.noise.covariance + SIZE**2 / bench.data.harmonics * np.outer(pair, pair)
+    noise = replace(now.noise, covariance=covariance)
+    wrong = misfit(bench, now, {("ankle", "motor"): 0.2, ("ankle", "link"): 0.2})
+    assert np.all(excess_power(bench, wrong, noise)[pair != 0.0] == 0.0)
+    torque = bench.torque_rms[index(bench, "ankle", "motor")]
+    assert remainder_share(bench, Settled(wrong, noise)) == pytest.approx(0.4 * SIZE / torque, rel=0.15)
+
+
+def test_noise_follows_the_spring_that_the_residual_is_measured_by(nothing_missing, monkeypatch):
+    """With a tenth of the stiffness both are a tenth at a link, and one beside the other is what it was."""
+    bench, now = nothing_missing
+    stiff = misfit(bench, now, {("knee", "link"): 0.1})
+    softer = np.array([10.0 if e.kind == "link" else 1.0 for e in bench.data.equations])
+    soft = replace(stiff, residual=stiff.residual / softer, scale=stiff.scale * softer)
+    steps = bench.period_steps(now.fit)
+    monkeypatch.setattr(bench, "period_steps", lambda fit: steps)
+    np.testing.assert_allclose(
+        excess_power(bench, soft, now.noise) * softer**2, excess_power(bench, stiff, now.noise), rtol=1e-9, atol=1e-12
+    )
+    assert gap_of(bench, soft, soft, now.noise).noise["knee"] < gap_of(bench, stiff, stiff, now.noise).noise["knee"]
+    of_both = [_per_joint(bench, Settled(fit, now.noise))["knee"]["link"] for fit in (soft, stiff)]
+    assert of_both[0] == pytest.approx(of_both[1])
+    places = [[p for p in locate(bench, fit, now.noise) if p.joint == "knee"] for fit in (soft, stiff)]
+    assert [(p.regime, pytest.approx(p.z)) for p in places[0]] == [(p.regime, p.z) for p in places[1]]
+    assert places[0][0].excess_rms == pytest.approx(0.1 * places[1][0].excess_rms)
+
+
 def test_gap_before_and_after(nothing_missing):
     bench, now = nothing_missing
     before, after = (misfit(bench, now, {("ankle", "motor"): a, ("ankle", "link"): a}) for a in (1.0, 0.25))
@@ -135,9 +167,10 @@ def test_gap_before_and_after(nothing_missing):
     assert gap.before["ankle"] == pytest.approx(np.sqrt(2.0) * SIZE, rel=0.15)
     assert gap.after["ankle"] == pytest.approx(0.25 * np.sqrt(2.0) * SIZE, rel=0.15)
     assert gap.shrink == pytest.approx(0.75, abs=0.07)
-    assert gap.noise == per_joint(bench, now.noise.std**2)
+    noise = noise_of_residual(after, now.noise)
+    assert gap.noise == per_joint(bench, noise**2)
     assert gap.noise["ankle"] == pytest.approx(
-        np.hypot(now.noise.std[index(bench, "ankle", "motor")], now.noise.std[index(bench, "ankle", "link")])
+        np.hypot(noise[index(bench, "ankle", "motor")], noise[index(bench, "ankle", "link")])
     )
 
 

@@ -136,6 +136,15 @@ def test_where_nothing_that_matters_is_missing_a_disagreement_is_said():
     assert "remainder" not in told
 
 
+def test_nothing_is_called_complete_beside_a_lack_of_fit():
+    """What hides below the noise of the torque may stand out of it harmonic by harmonic."""
+    nothing = replace(facts(Verdict.NONE, p_value=1e-4), missing=())
+    told = paragraph(nothing)
+    assert told.startswith("Nothing is named: model and data disagree beyond the noise (p = 0.0001), but by less than")
+    assert "missing" not in told
+    assert paragraph(replace(nothing, p_value=2e-3)).startswith("Nothing is missing")
+
+
 def test_of_what_drifts_no_gap_of_the_mean_is_told():
     drift = SimpleNamespace(effect=make_effect("torque_offset", "hip"))
     text = paragraph(facts(Verdict.NAMED, trends=(drift,)))

@@ -150,6 +150,14 @@ def test_with_the_repaired_model_its_sections_follow(diagnosis, leg_model, tmp_p
     assert "exo_leg: what the model lacks" in page
 
 
+@pytest.mark.parametrize(("p_value", "complete"), [(1e-4, False), (0.01, True)])
+def test_the_page_calls_nothing_complete_beside_a_lack_of_fit(p_value, complete, tmp_path):
+    none = Diagnosis(Verdict.NONE, "A sentence.", LackOfFit(0.0, 1, p_value, 1.0, {}))
+    page = page_of(none, tmp_path)
+    assert ("othing is missing" in page) is complete
+    assert ("othing is named" in page) is not complete
+
+
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_every_verdict_has_a_page_even_with_nothing_else(verdict, tmp_path):
     bare = Diagnosis(verdict, "A sentence.", LackOfFit(0.0, 1, 1.0, 1.0, {}))

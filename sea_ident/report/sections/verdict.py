@@ -4,6 +4,7 @@ from typing import Any, ClassVar
 
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Verdict, chance
+from sea_ident.discrepancy.lack import LACK_LEVEL
 from sea_ident.report.section import DiagnosisSection
 
 MEANING = {
@@ -28,8 +29,10 @@ class VerdictSection(DiagnosisSection):
 
     def of_diagnosis(self, diagnosis: Diagnosis) -> dict[str, Any] | None:
         """Sentence, tiles and table."""
-        level, meaning = MEANING[diagnosis.verdict]
         lack = diagnosis.lack_of_fit
+        level, meaning = MEANING[diagnosis.verdict]
+        if diagnosis.verdict is Verdict.NONE and lack.p_value < LACK_LEVEL:
+            level, meaning = "warn", "nothing is named, though model and data disagree beyond the noise"
         one, several = ("effect missing", "effects missing")
         if diagnosis.verdict is Verdict.ONLY_AGAINST_REFERENCE:
             one, several = ("change against the reference", "changes against the reference")
