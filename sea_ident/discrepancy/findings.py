@@ -95,8 +95,15 @@ class MissingParameter:
     std: float
     unit: str
 
+    @property
+    def straight(self) -> bool:
+        """Whether it is the time constant of a drift that goes straight on: it stands for that, and is no time."""
+        return not self.std and self.name.endswith("_drift_time_constant")
+
     def __str__(self) -> str:
-        """Name, value with its standard deviation or that it was held, unit."""
+        """Name, value with its standard deviation or that it was held, unit; of a straight course that it is one."""
+        if self.straight:
+            return f"{self.name} none: the course is straight"
         value = f"{self.value:.4g}"
         sure = f"{value} +- {self.std:.2g} {self.unit}" if self.std else f"{value} {self.unit}, held"
         return f"{self.name} {sure}"

@@ -125,6 +125,19 @@ def test_the_page_says_verdict_gap_effect_and_alternatives(diagnosis, tmp_path):
     assert "0.1 % of the torque: an unmodelled remainder" in text
 
 
+def test_a_straight_course_is_called_so_and_has_no_time(diagnosis, tmp_path):
+    (found,) = diagnosis.missing
+    rate = MissingParameter("knee.friction_drift_coulomb", 0.6, 0.02, "N m/min")
+    mark = MissingParameter("knee.friction_drift_time_constant", 6e4, 0.0, "s")
+    for time, told in ((mark, "none: the course is straight"), (replace(mark, value=60.0, std=9.0), "60 +- 9 s")):
+        drifts = replace(diagnosis, missing=(replace(found, effect="friction_drift", parameters=(rate, time)),))
+        assert f"    {mark.name} {told}" in drifts.summary().splitlines()
+        assert f"{mark.name} {told.replace('+- ', '')}" in words(page_of(drifts, tmp_path))
+        written = drifts.to_dict()["missing"][0]["parameters"][1]
+        assert written == {"name": mark.name, "value": time.value, "std": time.std, "unit": "s"}
+    assert "none: the course" not in str(replace(mark, name="knee.stribeck_friction_speed"))
+
+
 def test_what_was_held_has_no_standard_deviation(diagnosis, tmp_path):
     (found,) = diagnosis.missing
     size, speed = found.parameters
