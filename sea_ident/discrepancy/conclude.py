@@ -351,7 +351,6 @@ def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
             s.unit,
         )
         for s in effect.shapes
-        if s.name != "time_constant" or trend.time_constant_std > 0.0  # a straight course has none
     )
     others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
     return MissingEffect(
