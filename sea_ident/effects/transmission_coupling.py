@@ -17,10 +17,7 @@ SMALLEST_RATIO = 1e-4
 """Below this the derivative stands for the difference [-]."""
 
 LARGEST_RATIO = 1.0
-"""The Coulomb friction is turned over by no more than this [-] or [m/rad]."""
-
-LARGEST_TURN = 100.0
-"""And a motor that turns by no more than this where the other joint slides: by a pinion of a centimetre [rad/m]."""
+"""The Coulomb friction is turned over by no more than this [-]."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +34,7 @@ class TransmissionCoupling(Effect):
         viscous: friction of the motor [N m s/rad].
         coulomb: friction of the motor [N m].
         smoothing: speed around which the sign is smoothed [rad/s].
-        ratio: r at which the Coulomb friction turns over: with the speed of the motor, not of the joint [-], [rad/m]
-            or [m/rad].
+        ratio: r at which the Coulomb friction turns over: with the speed of the motor, not of the joint [-].
     """
 
     other: str | None = None
@@ -56,15 +52,15 @@ class TransmissionCoupling(Effect):
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:
-        """Every motor with the joint before it and the joints after it, on the way from the base."""
-        before = {name: _joint_before(robot, name) for name in robot.joint_names}
-        return tuple(
-            cls(joint=joint.name, other=other)
-            for joint in robot.joints
-            if joint.actuator is not None
-            for other in (before[joint.name], *(name for name, own in before.items() if own == joint.name))
-            if other is not None
-        )
+        """Every motor with the joint before it and the joint after it."""
+        names = robot.joint_names
+        pairs = [
+            (names[i], names[k])
+            for i in range(len(names))
+            for k in (i - 1, i + 1)
+            if 0 <= k < len(names) and robot.joints[i].actuator is not None
+        ]
+        return tuple(cls(joint=joint, other=other) for joint, other in pairs)
 
     @property
     def title(self) -> str:
@@ -72,13 +68,10 @@ class TransmissionCoupling(Effect):
         return titled(self.name, self.joint) + ("" if self.other is None else f" from {self.other}")
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
-        """The ratio r times the inertia, the viscous and the Coulomb friction of the motor.
-
-        By what the other joint does to the motor, and the last by what the motor does to the other joint.
-        """
-        i, k = self._indices(robot)
-        torque, position = robot.joints[i].torque_unit, robot.joints[k].position_unit
-        units = (f"{torque} s2/{position}", f"{torque} s/{position}", robot.joints[k].torque_unit)
+        """The ratio r times the inertia, the viscous and the Coulomb friction of the motor."""
+        i, _ = self._indices(robot)
+        torque, position = robot.joints[i].torque_unit, robot.joints[i].position_unit
+        units = (f"{torque} s2/{position}", f"{torque} s/{position}", torque)
         return tuple(
             Column(self.parameter_name(f"{label}_from_{self.other}"), unit, self.name, self.joint, self.side)
             for label, unit in zip(("inertia", "viscous", "coulomb"), units, strict=True)
@@ -108,16 +101,7 @@ class TransmissionCoupling(Effect):
         return (self,)
 
     def planted(self, robot: Robot, ratio: float) -> FloatArray:
-        """(3,) parameters of a motor of this description.
-
-        Raises:
-            EffectError: the ratio is beyond what the effect follows.
-        """
-        largest = self._largest(robot)
-        if abs(ratio) > largest:
-            raise EffectError(
-                f"the effect {self.name!r} at {self.joint!r} follows ratios up to {largest:g}; {ratio:g} was given"
-            )
+        """(3,) parameters of a motor of this description."""
         return ratio * np.array(self._motor(robot))
 
     def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
@@ -173,12 +157,7 @@ class TransmissionCoupling(Effect):
         _, viscous, coulomb = self._motor(robot)
         amount, of = (values[2], coulomb) if coulomb > 0.0 else (values[1], viscous)
         ratio = float(amount) / of if of > 0.0 else 0.0
-        largest = self._largest(robot)
-        return float(np.clip(ratio, -largest, largest))
-
-    def _largest(self, robot: Robot) -> float:
-        i, k = self._indices(robot)
-        return LARGEST_TURN if robot.joints[k].prismatic and not robot.joints[i].prismatic else LARGEST_RATIO
+        return float(np.clip(ratio, -LARGEST_RATIO, LARGEST_RATIO))
 
     def _motor(self, robot: Robot) -> tuple[float, float, float]:
         actuator = robot.joints[self._indices(robot)[0]].actuator
@@ -202,12 +181,3 @@ class TransmissionCoupling(Effect):
         if robot.joints[i].actuator is None:
             raise EffectError(f"joint {self.joint!r} of {robot.name} has no motor that could move another joint")
         return i, k
-
-
-def _joint_before(robot: Robot, name: str) -> str | None:
-    """The nearest joint of the robot on the way to its base, None for the first; others are passed over."""
-    model = robot.model
-    parent = model.parents[model.getJointId(name)]
-    while parent and model.names[parent] not in robot.joint_names:
-        parent = model.parents[parent]
-    return str(model.names[parent]) if parent else None
