@@ -52,15 +52,13 @@ class TransmissionCoupling(Effect):
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:
-        """Every motor with the joint before it and the joint after it."""
-        names = robot.joint_names
-        pairs = [
-            (names[i], names[k])
-            for i in range(len(names))
-            for k in (i - 1, i + 1)
-            if 0 <= k < len(names) and robot.joints[i].actuator is not None
-        ]
-        return tuple(cls(joint=joint, other=other) for joint, other in pairs)
+        """Every motor with the joint before it in the tree and the joints after it."""
+        return tuple(
+            cls(joint=joint.name, other=robot.joint_names[k])
+            for i, joint in enumerate(robot.joints)
+            if joint.actuator is not None
+            for k in robot.neighbours(i)
+        )
 
     @property
     def title(self) -> str:

@@ -149,6 +149,30 @@ class Robot:
                 f"{self.name} has no joint {joint!r}; its joints are {', '.join(self.joint_names)}"
             ) from None
 
+    def neighbours(self, index: int) -> tuple[int, ...]:
+        """Positions in `joints` of the joint before one in the kinematic tree, if there is any, and of those after it.
+
+        Joints that are locked or mimic others are passed over.
+
+        Args:
+            index: position of the joint in `joints`.
+        """
+        before = self._before
+        first = () if before[index] < 0 else (before[index],)
+        return (*first, *(k for k in range(self.n) if before[k] == index))
+
+    @cached_property
+    def _before(self) -> tuple[int, ...]:
+        """(n,) position in `joints` of the joint before each one in the kinematic tree, -1 at the base."""
+        names, parents = list(self.model.names), self.model.parents
+        found = []
+        for name in self.joint_names:
+            body = parents[names.index(name, 1)]
+            while body and names[body] not in self.joint_names:
+                body = parents[body]
+            found.append(self.index(names[body]) if body else -1)
+        return tuple(found)
+
     def spring(self, joint: str) -> SeriesElasticActuator:
         """Actuator of an elastic joint.
 

@@ -8,6 +8,7 @@ import sea_ident
 from sea_ident.effects import State, make_effect
 from sea_ident.effects.transmission_coupling import TransmissionCoupling
 from sea_ident.motion import Motion
+from sea_ident.robot import robot_from_text
 
 RATIO = 0.3
 
@@ -25,6 +26,54 @@ def inverse_dynamics(robot, motion):
     v, a = robot.extended_rate(motion.dq, motion.dtheta), robot.extended_rate(motion.ddq, motion.ddtheta)
     torque = np.stack([pin.rnea(model, data, *each) for each in zip(x, v, a, strict=True)])
     return np.stack([torque @ robot.link_map, torque @ robot.motor_map])
+
+
+def tree(*joints):
+    """A robot out of joints (parent, child, type), each with a motor and named as the link that it moves."""
+    links = dict.fromkeys(name for parent, child, _ in joints for name in (parent, child))
+    parts = [
+        f'<link name="{name}"><inertial><origin xyz="0.1 0.02 0.2"/><mass value="2"/>'
+        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        for name in links
+    ]
+    for parent, child, kind in joints:
+        parts.append(
+            f'<joint name="{child}" type="{kind}"><origin xyz="0 0 0.3"/><parent link="{parent}"/>'
+            f'<child link="{child}"/><axis xyz="0 1 0"/>'
+            '<limit lower="-1" upper="1" velocity="3" effort="100"/></joint>'
+            f'<transmission name="{child}" type="transmission_interface/SimpleTransmission"><joint name="{child}"/>'
+            '<actuator name="motor"><mechanicalReduction>50</mechanicalReduction><rotorInertia>1e-4</rotorInertia>'
+            "<viscousFriction>0.5</viscousFriction><coulombFriction>0.8</coulombFriction></actuator></transmission>"
+        )
+    return robot_from_text(f'<robot name="tree">{"".join(parts)}</robot>', "tree.urdf")
+
+
+def pairs(robot):
+    return [(effect.joint, effect.other) for effect in TransmissionCoupling.instances(robot)]
+
+
+def test_motors_are_coupled_with_their_neighbours_in_the_tree():
+    """Not with those of another branch that happen to come next."""
+    robot = tree(
+        ("base", "waist", "revolute"),
+        ("waist", "l_arm", "revolute"),
+        ("l_arm", "l_hand", "revolute"),
+        ("waist", "r_arm", "revolute"),
+    )
+    assert robot.joint_names == ("waist", "l_arm", "l_hand", "r_arm")
+    assert pairs(robot) == [
+        ("waist", "l_arm"),
+        ("waist", "r_arm"),
+        ("l_arm", "waist"),
+        ("l_arm", "l_hand"),
+        ("l_hand", "l_arm"),
+        ("r_arm", "waist"),
+    ]
+
+
+def test_motors_of_a_chain_are_coupled_with_the_joint_before_and_the_joint_after():
+    leg = sea_ident.load_robot("exo_leg")
+    assert pairs(leg) == [("hip", "knee"), ("knee", "hip"), ("knee", "ankle"), ("ankle", "knee")]
 
 
 def inertia_of(leg, joint, other):

@@ -190,6 +190,20 @@ def test_order_of_the_joints_is_that_of_pinocchio_whatever_their_names() -> None
     assert list(one.joint_names) == list(model.names)[1:]
 
 
+def test_neighbours_are_those_in_the_tree() -> None:
+    """One is next to another where no joint but one of the two moves one body and not the other."""
+    more = (link("thumb"), joint("thumb", "right", "thumb"), link("other"), joint("other", "base", "other"))
+    robot = build(*FINGERS, *more)
+    assert robot.joint_names == ("other", "shoulder", "elbow", "thumb", "slide")
+    bodies = [list(robot.model.names).index(name) for name in robot.joint_names]
+    paths = [{int(k) for k in robot.model.supports[body]} & set(bodies) for body in bodies]
+    for i, path in enumerate(paths):
+        expected = {k for k, other in enumerate(paths) if len(path ^ other) == 1 and path & other}
+        assert set(robot.neighbours(i)) == expected
+    assert robot.neighbours(2) == (1, 3, 4)  # of the fingers the one that follows is passed over
+    assert build(*FINGERS, *more, joints=("shoulder", "thumb", "other")).neighbours(1) == (2,)
+
+
 def test_any_name_is_kept() -> None:
     names = ("universe", "a b", "é", "hip rotor")
     robot = build(*map(link, names), *(joint(f" {n} ", a, n) for a, n in pairwise(names)))
