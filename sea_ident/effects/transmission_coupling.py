@@ -13,11 +13,15 @@ from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
-SMALLEST_RATIO = 1e-4
-"""Below this the derivative stands for the difference [-]."""
+SMALLEST_SHIFT = 1e-4
+"""Share of the smoothing speed below which the derivative stands for the difference [-]."""
 
 LARGEST_RATIO = 1.0
-"""The Coulomb friction is turned over by no more than this [-]."""
+"""A fit turns the Coulomb friction over by no more than this, between joints of one kind [-], ..."""
+
+LEVERS = (0.01, 1.0)
+"""... and between a slide and a turning joint by no more than a pinion of the first radius or a drum of the second [m].
+"""
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class TransmissionCoupling(Effect):
         viscous: friction of the motor [N m s/rad].
         coulomb: friction of the motor [N m].
         smoothing: speed around which the sign is smoothed [rad/s].
-        ratio: r at which the Coulomb friction turns over: with the speed of the motor, not of the joint [-].
+        ratio: r at which the Coulomb friction turns over: with the speed of the motor, not of the joint [-], or
+            [rad/m] where only the other joint slides, [m/rad] where only the own does.
     """
 
     other: str | None = None
@@ -67,9 +72,14 @@ class TransmissionCoupling(Effect):
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """The ratio r times the inertia, the viscous and the Coulomb friction of the motor."""
-        i, _ = self._indices(robot)
-        torque, position = robot.joints[i].torque_unit, robot.joints[i].position_unit
-        units = (f"{torque} s2/{position}", f"{torque} s/{position}", torque)
+        own, other = (robot.joints[k] for k in self._indices(robot))
+        # what is between two joints is symmetric, as in a matrix of masses: N s2/rad whichever of them slides
+        first, second = (own, other) if own.prismatic else (other, own)
+        units = (
+            f"{first.torque_unit} s2/{second.position_unit}",
+            f"{first.torque_unit} s/{second.position_unit}",
+            other.torque_unit,
+        )
         return tuple(
             Column(self.parameter_name(f"{label}_from_{self.other}"), unit, self.name, self.joint, self.side)
             for label, unit in zip(("inertia", "viscous", "coulomb"), units, strict=True)
@@ -82,7 +92,7 @@ class TransmissionCoupling(Effect):
         link, motor = (np.zeros((len(motion), state.robot.n, 3)) for _ in range(2))
         turned = motion.dtheta[:, i] + self.ratio * motion.dq[:, k]
         sign = smooth_sign(turned, self.smoothing)
-        if abs(self.ratio) > SMALLEST_RATIO:
+        if np.abs(self.ratio * motion.dq[:, k]).max(initial=0.0) > SMALLEST_SHIFT * self.smoothing:
             change = (sign - smooth_sign(motion.dtheta[:, i], self.smoothing)) / self.ratio
         else:
             change = (1.0 - sign**2) / self.smoothing * motion.dq[:, k]
@@ -122,7 +132,8 @@ class TransmissionCoupling(Effect):
             smoothing=self.smoothing if self.coulomb else anchor.smoothing(str(self.joint)) or self.smoothing,
         )
         values = np.array([anchor.value(column.name) for column in self.columns(anchor.robot)])
-        return replace(known, ratio=known._ratio(anchor.robot, values))
+        largest = self._largest_ratio(anchor.robot)
+        return replace(known, ratio=float(np.clip(known._ratio(anchor.robot, values), -largest, largest)))
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The friction; the inertia acts in `modified`."""
@@ -154,8 +165,15 @@ class TransmissionCoupling(Effect):
         """R by the friction, the Coulomb friction first: it says it by where it turns over."""
         _, viscous, coulomb = self._motor(robot)
         amount, of = (values[2], coulomb) if coulomb > 0.0 else (values[1], viscous)
-        ratio = float(amount) / of if of > 0.0 else 0.0
-        return float(np.clip(ratio, -LARGEST_RATIO, LARGEST_RATIO))
+        return float(amount) / of if of > 0.0 else 0.0
+
+    def _largest_ratio(self, robot: Robot) -> float:
+        """Largest r of a fit, in the unit of `ratio`."""
+        own, other = (robot.joints[k] for k in self._indices(robot))
+        if own.prismatic == other.prismatic:
+            return LARGEST_RATIO
+        shortest, longest = LEVERS
+        return longest if own.prismatic else 1.0 / shortest
 
     def _motor(self, robot: Robot) -> tuple[float, float, float]:
         actuator = robot.joints[self._indices(robot)[0]].actuator

@@ -1,11 +1,13 @@
 """The columns of a motor that moves two joints are the difference that its coupling makes to inverse dynamics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sea_ident
-from sea_ident.effects import State, make_effect
+from sea_ident.effects import Anchor, SimulationState, State, make_effect
 from sea_ident.effects.transmission_coupling import TransmissionCoupling
 from sea_ident.motion import Motion
 from sea_ident.robot import robot_from_text
@@ -122,3 +124,79 @@ def test_friction(ratio):
     expected[1, :, i] = friction(turned) - friction(motion.dtheta[:, i])
     np.testing.assert_allclose(part.link @ values, expected[0], atol=1e-12)
     np.testing.assert_allclose(part.motor @ values, expected[1], atol=1e-12)
+
+
+KINDS = {
+    ("revolute", "revolute"): ("N m s2/rad", "N m s/rad", "N m"),
+    ("revolute", "prismatic"): ("N s2/rad", "N s/rad", "N"),
+    ("prismatic", "revolute"): ("N s2/rad", "N s/rad", "N m"),
+    ("prismatic", "prismatic"): ("N s2/m", "N s/m", "N"),
+}
+"""Kinds of the joint of the motor and of the other one, and the units of r J, r b and r c."""
+
+
+def two_joints(own, other):
+    return tree(("base", "other", other), ("other", "own", own))
+
+
+@pytest.mark.parametrize("ratio", [RATIO, 5e-5])
+@pytest.mark.parametrize("kinds", KINDS)
+def test_a_motion_in_millimetres_has_the_same_energy(kinds, ratio):
+    """Forces along a slide are a thousandth then, and parameters change by the metres in their units alone."""
+    robot = two_joints(*kinds)
+    effect = TransmissionCoupling("own", "other", ratio=ratio, smoothing=0.05)
+    units = [column.unit for column in effect.columns(robot)]
+    assert tuple(units) == KINDS[kinds]
+    values = np.array([0.5, 0.3, 0.2])
+    longer = np.array([1000.0 if joint.prismatic else 1.0 for joint in robot.joints])
+    own, other = longer[robot.index("own")], longer[robot.index("other")]
+    metres = [(0 if unit.startswith("N m") else -1) - unit.endswith("/m") for unit in units]
+    motion = random_motion(robot.n)
+    parts = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
+    scaled = Motion(motion.time, *(getattr(motion, part) * longer for part in parts))
+    in_millimetres = replace(effect, ratio=ratio * own / other, smoothing=0.05 * own)
+    before, after = effect.evaluate(State(robot, motion)), in_millimetres.evaluate(State(robot, scaled))
+    for rows, others in ((before.link, after.link), (before.motor, after.motor)):
+        np.testing.assert_allclose(others @ (values * 1000.0 ** np.array(metres)), rows @ values / longer, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("kinds", "ratio"), [(("revolute", "prismatic"), 3.0), (("revolute", "revolute"), -1.5)])
+def test_friction_and_inertia_of_a_simulation_turn_by_the_same_ratio(kinds, ratio):
+    robot = two_joints(*kinds)
+    i, k = robot.index("own"), robot.index("other")
+    effect = make_effect("transmission_coupling", "own", other="other", smoothing=0.05)
+    values = effect.planted(robot, ratio)
+    q, dq, theta, dtheta, none = np.random.default_rng(4).standard_normal((5, robot.n))
+    turned = dtheta[i] + ratio * dq[k]
+    # 50 turns of the rotor for one of the motor after its gear
+    change = effect.modified(robot, values).extended_rate(dq, dtheta) - robot.extended_rate(dq, dtheta)
+    rotor = robot.extended_model.joints[int(robot.rotor_indices[[r.joint for r in robot.rotors].index("own")])].idx_v
+    assert change[rotor] == pytest.approx(50.0 * ratio * dq[k])
+    link, motor = np.zeros(robot.n), np.zeros(robot.n)
+    effect.torque(robot, values)(SimulationState(0.0, q, dq, theta, dtheta, none, none), link, motor)
+
+    def friction(speed):
+        return 0.5 * speed + 0.8 * np.tanh(speed / 0.05)
+
+    assert link[k] == pytest.approx(ratio * friction(turned))
+    assert motor[i] == pytest.approx(friction(turned) - friction(dtheta[i]))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "given", "expected"),
+    [
+        (("revolute", "prismatic"), 3.0, 3.0),
+        (("revolute", "prismatic"), -1000.0, -100.0),
+        (("prismatic", "revolute"), 0.3, 0.3),
+        (("prismatic", "revolute"), 3.0, 1.0),
+        (("revolute", "revolute"), 3.0, 1.0),
+        (("prismatic", "prismatic"), -3.0, -1.0),
+    ],
+)
+def test_a_fit_bounds_the_ratio_by_levers_where_kinds_differ(kinds, given, expected):
+    """A slide may turn a pinion of a third of a metre by 3 rad/m, and none of a millimetre."""
+    robot = two_joints(*kinds)
+    effect = TransmissionCoupling("own", "other")
+    values = dict(zip((c.name for c in effect.columns(robot)), effect.planted(robot, given), strict=True))
+    model = {"own.rotor_inertia": 1e-4, "own.viscous_friction": 0.5, "own.coulomb_friction": 0.8}
+    assert effect.anchored(Anchor(robot, (effect,), values | model)).ratio == pytest.approx(expected)
