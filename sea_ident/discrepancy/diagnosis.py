@@ -1,7 +1,7 @@
 """What a diagnosis says, and DIAGNOSIS.json."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -85,13 +85,12 @@ class Diagnosis:
                 lines.append(f"    or: {others}")
         gaps = {"training": self.training, "held out": self.holdout}
         gaps |= {f"forward simulation of {kind}": gap for kind, gap in self.simulation_gap.items()}
-        positions = ("of q", "of theta")
-        lines.extend(
-            f"  gap [{position_unit(self.units) if label.endswith(positions) else torque_unit(self.units)}], {label}: "
-            f"{gap.summary()}"
-            for label, gap in gaps.items()
-            if gap is not None
-        )
+        for label, gap in gaps.items():
+            if gap is not None:
+                units = units_by_joint(self.units, gap.before, positions=label.endswith(("of q", "of theta")))
+                alike = len(of_all := set(units.values())) == 1
+                told = f" [{of_all.pop()}], {label}: {gap.summary()}" if alike else f", {label}: {gap.summary(units)}"
+                lines.append(f"  gap{told}")
         if self.next_experiment is not None:
             first, second = self.next_experiment.separates
             lines.append(f"  next experiment: tells {first} from {second} {self.next_experiment.gain:.3g} times better")
@@ -174,6 +173,12 @@ def torque_unit(units: Mapping[str, str]) -> str:
 def position_unit(units: Mapping[str, str]) -> str:
     """Unit of the positions of all joints, of which those of the torque are given."""
     return {"N m": "rad", "N": "m"}.get(torque_unit(units), "rad or m")
+
+
+def units_by_joint(units: Mapping[str, str], joints: Iterable[str], *, positions: bool = False) -> dict[str, str]:
+    """Unit of the torque of each of these joints or of its position; of either kind where it is not known."""
+    unit_of = position_unit if positions else torque_unit
+    return {joint: unit_of({joint: units[joint]} if joint in units else {}) for joint in joints}
 
 
 def read_diagnosis(path: str | Path) -> Diagnosis:

@@ -246,13 +246,14 @@ class Gap:
         units = {j: max(self.noise[j], NOISE_FREE * max(self.before[j], self.after[j]), 1e-300) for j in sizes}
         return np.array([size / units[joint] for joint, size in sizes.items()])
 
-    def summary(self) -> str:
-        """Before, after and noise per joint."""
+    def summary(self, units: Mapping[str, str] | None = None) -> str:
+        """Before, after and noise per joint, with these units where they are not said elsewhere."""
         parts = []
         for joint, before in self.before.items():
             after, noise = self.after[joint], self.noise[joint]
             change = "within the noise" if before == after == 0.0 else f"{before:.3g} -> {after:.3g}"
-            parts.append(f"{joint} {change} (noise {noise:.2g})")
+            unit = "" if units is None else f" {units[joint]}"
+            parts.append(f"{joint} {change} (noise {noise:.2g}{unit})")
         shrink = f"; shrink {self.shrink:.2f}" if any(value > 0.0 for value in self.before.values()) else ""
         return f"{', '.join(parts)}{shrink}"
 

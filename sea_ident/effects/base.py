@@ -235,7 +235,7 @@ class Effect(ABC):
     def shape_unit(self, shape: Shape, robot: Robot) -> str:
         """Unit of a shape parameter at this joint: m in place of rad where the joint slides."""
         if self.joint is not None and robot.joints[robot.index(self.joint)].prismatic:
-            return shape.unit.replace("N m", "N").replace("rad", "m")
+            return shape.unit.replace("(N m)", "N").replace("N m", "N").replace("rad", "m")
         return shape.unit
 
     def parameter_name(self, label: str | None = None) -> str:

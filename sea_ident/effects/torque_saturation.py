@@ -42,9 +42,9 @@ class TorqueSaturation(LoadEffect):
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """One column."""
-        unit = robot.joints[robot.index(self.at)].torque_unit
-        power = f"{self.exponent - 1.0:.3g}"
-        return (Column(self.parameter_name(), f"1/({unit})^{power}", self.name, self.joint, self.side, True),)
+        torque = "N" if robot.joints[robot.index(self.at)].prismatic else "(N m)"
+        unit = f"1/{torque}^{self.exponent - 1.0:.3g}"
+        return (Column(self.parameter_name(), unit, self.name, self.joint, self.side, True),)
 
     def variants(self, state: State) -> tuple["TorqueSaturation", ...]:
         """The cube: other powers are nearly the same, and found from there."""

@@ -11,7 +11,7 @@ _HEIGHT, _LEFT, _TOP, _BOTTOM, _BAR = 190, 66, 22, 40, 22
 
 
 def bars(
-    groups: Sequence[str], series: Mapping[str, Sequence[float]], roles: Sequence[str], title: str, unit: str
+    groups: Sequence[str], series: Mapping[str, Sequence[float]], roles: Sequence[str], title: str, units: Sequence[str]
 ) -> Markup:
     """Bars from zero, side by side.
 
@@ -20,7 +20,7 @@ def bars(
         series: name -> (G,) values, not negative.
         roles: colour of each series.
         title: shown above.
-        unit: of the values.
+        units: (G,) of the values of each group.
 
     Returns:
         The SVG.
@@ -45,16 +45,15 @@ def bars(
         x = _LEFT + 13 + g * pitch
         for k, (label, values) in enumerate(series.items()):
             value = float(values[g])
-            tip = escape(f"{name}, {label}: {value:.3g} {unit}")
+            tip = escape(f"{name}, {label}: {value:.3g} {units[g]}")
             out.append(
                 f'<rect class="bar s-{roles[k]}" x="{x + k * _BAR}" y="{y(value):.1f}" width="{_BAR - 3}" '
                 f'height="{max(inner * value / top, 0.8):.1f}"><title>{tip}</title></rect>'
             )
         middle = x + count * _BAR / 2
         out.append(f'<text class="tx" x="{middle:.0f}" y="{_HEIGHT - 22}">{escape(name)}</text>')
-    out.append(
-        f'<text class="label" transform="rotate(-90)" x="{-(_TOP + inner / 2):.0f}" y="12">{escape(unit)}</text></svg>'
-    )
+    label = escape(" or ".join(dict.fromkeys(units)))
+    out.append(f'<text class="label" transform="rotate(-90)" x="{-(_TOP + inner / 2):.0f}" y="12">{label}</text></svg>')
     return Markup("".join(out))
 
 

@@ -237,6 +237,21 @@ def test_a_spring_effect_cancels_in_the_sum(leg):
         assert np.abs(rows.motor).max() > 0.0
 
 
+@pytest.mark.filterwarnings("ignore:.*no transmission")
+@pytest.mark.parametrize(("robot", "joint", "told"), [
+    ("exo_leg", "knee", {"rad/(N m)", "1/(N m)^2", "rad/s", "1/rad"}),
+    ("emps", "slider", {"m/N", "1/N^2", "m/s", "1/m"}),
+])  # fmt: skip
+def test_units_are_those_of_the_joint_without_needless_brackets(robot, joint, told):
+    robot = load_robot(robot)
+    found = set()
+    for name in ("link_flexibility", "torque_saturation", "stribeck_friction", "torque_ripple"):
+        effect = make_effect(name, joint)
+        shapes = (*effect.shapes, *getattr(effect, "amounts", ()))
+        found |= {effect.shape_unit(s, robot) for s in shapes} | {c.unit for c in effect.columns(robot)}
+    assert found == told | {"-", robot.joints[robot.index(joint)].torque_unit}
+
+
 def test_an_unknown_joint_is_told(leg):
     with pytest.raises(Exception, match="its joints are hip, knee, ankle"):
         make_effect("stribeck_friction", "elbow").columns(leg)

@@ -7,7 +7,7 @@ from sea_ident.report.bars import bars
 
 def test_every_name_is_shown_as_it_is():
     names = ["<b>joint</b>", 'a & "b"']
-    svg = bars(names, {"<i>before</i>": [1.0, 2.0]}, ["before"], "gap < 1 & more", "N m <sup>")
+    svg = bars(names, {"<i>before</i>": [1.0, 2.0]}, ["before"], "gap < 1 & more", ["N m <sup>"] * 2)
     root = ElementTree.fromstring(svg)
     shown = ["".join(e.itertext()) for e in root.iter("text")]
     assert {*names, "gap < 1 & more", "N m <sup>"} <= set(shown)

@@ -245,18 +245,27 @@ def test_a_sliding_joint_has_its_own_units(diagnosis, tmp_path):
     chart = curve(slides.missing[0], slides.waveforms, slides.units)
     assert chart.x_label == "motor velocity of the knee [m/s]"
     assert chart.y_label == "force [N], knee motor"
-    assert "gap [N m or N], training" in slides.summary()
+    summary = slides.summary()
+    assert "gap, training: hip" in summary
+    assert re.search(r"hip [^,]*\(noise \S+ N m\), knee [^,]*\(noise \S+ N\), ankle", summary)
+    assert re.search(r"forward simulation of q: hip [^,]*\(noise \S+ rad\), knee [^,]*\(noise \S+ m\), ankle", summary)
     assert "gap [N m], training" in diagnosis.summary()
     assert "gap [rad], forward simulation of q" in diagnosis.summary()
     page = page_of(diagnosis, tmp_path)
     for text in ("N m or N", "rad or m", "rad or mm"):
         assert text not in page
+    page = page_of(slides, tmp_path)
+    # what is over all joints says both, what is of one its own
+    assert set(re.findall(r">([^<>]*N m or N|[^<>]*rad or mm)<", page)) == {"N m or N", "mrad or mm"}
+    assert re.findall(r"(hip|knee), noise: \S+ (.*?)<", page)[:2] == [("hip", "N m"), ("knee", "N")]
+    assert "near reversal 0.41 N 88" in words(page)
+    assert "time 0 to 1.25 s 0.02 N m 6.2" in words(page)
     diagnosis.save(tmp_path / "d.json")
     assert read_diagnosis(tmp_path / "d.json").units == diagnosis.units
 
 
 def test_bars_are_as_high_as_their_values():
-    svg = bars(["a", "b"], {"before": [4.0, 2.0], "after": [1.0, 0.0]}, ["before", "after"], "t", "N m")
+    svg = bars(["a", "b"], {"before": [4.0, 2.0], "after": [1.0, 0.0]}, ["before", "after"], "t", ["N m", "N m"])
     root = ElementTree.fromstring(svg)
     rectangles = [e for e in root.iter("rect")]
     heights = [float(e.attrib["height"]) for e in rectangles]

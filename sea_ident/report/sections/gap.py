@@ -1,8 +1,9 @@
 """The gap between model and data, before and after the repair."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, position_unit, torque_unit
+from sea_ident.discrepancy.diagnosis import Diagnosis, torque_unit, units_by_joint
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.report.bars import bars, bars_legend
 from sea_ident.report.chart import Band, Chart, Line
@@ -28,12 +29,13 @@ class GapSection(DiagnosisSection):
             ("data that were held out", diagnosis.holdout),
         ):
             if gap is not None:
-                groups.append((_bars(gap, f"On {label}", torque_unit(diagnosis.units)), _closed(gap, diagnosis.adds)))
+                units = units_by_joint(diagnosis.units, gap.before)
+                groups.append((_bars(gap, f"On {label}", units), _closed(gap, diagnosis.adds)))
         for signal, gap in diagnosis.simulation_gap.items():
-            unit, scale = torque_unit(diagnosis.units), 1.0
+            units, scale = units_by_joint(diagnosis.units, gap.before, positions=signal in POSITIONS), 1.0
             if signal in POSITIONS:
-                unit, scale = " or ".join(f"m{part}" for part in position_unit(diagnosis.units).split(" or ")), 1e3
-            groups.append((_bars(gap, f"Forward simulation, {signal}", unit, scale), _closed(gap, diagnosis.adds)))
+                units, scale = {j: " or ".join(f"m{u}" for u in unit.split(" or ")) for j, unit in units.items()}, 1e3
+            groups.append((_bars(gap, f"Forward simulation, {signal}", units, scale), _closed(gap, diagnosis.adds)))
         if not groups:
             return None
         return {
@@ -54,13 +56,13 @@ def _closed(gap: Gap, added: bool) -> str:
     return f"{100.0 * gap.shrink:.0f} % of the gap is closed."
 
 
-def _bars(gap: Gap, title: str, unit: str, scale: float = 1.0) -> Any:
+def _bars(gap: Gap, title: str, units: Mapping[str, str], scale: float = 1.0) -> Any:
     joints = list(gap.before)
     series = {
         name: [scale * part[joint] for joint in joints]
         for name, part in zip(NAMES, (gap.before, gap.after, gap.noise), strict=True)
     }
-    return bars(joints, series, ROLES, title, unit)
+    return bars(joints, series, ROLES, title, [units[joint] for joint in joints])
 
 
 def _waves(diagnosis: Diagnosis) -> list[Any]:

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, torque_unit
+from sea_ident.discrepancy.diagnosis import Diagnosis, units_by_joint
 from sea_ident.report.matrix import matrix
 from sea_ident.report.section import DiagnosisSection
 
@@ -26,6 +26,7 @@ class Locations(DiagnosisSection):
             return None
         rows = sorted({(x.joint, x.equation) for x in found}, key=lambda pair: _joint_order(diagnosis, pair))
         regimes = list(dict.fromkeys(x.regime for x in sorted(found, key=lambda x: _regime_order(x.regime))))
+        units = units_by_joint(diagnosis.units, (x.joint for x in found))
         values = np.full((len(rows), len(regimes)), np.nan)
         tips = [[""] * len(regimes) for _ in rows]
         for x in found:
@@ -34,13 +35,13 @@ class Locations(DiagnosisSection):
             values[i, j] = -np.log1p(x.z) / np.log1p(max(SATURATED, found[0].z))
             tips[i][j] = (
                 f"{x.joint}, {x.equation} equation\n{x.regime}\n{x.excess_rms:.3g} "
-                f"{diagnosis.units.get(x.joint, torque_unit({}))} beyond noise, z = {x.z:.3g}"
+                f"{units[x.joint]} beyond noise, z = {x.z:.3g}"
             )
         names = [f"{joint}, {equation}" for joint, equation in rows]
         return {
             "map": matrix(values, names, regimes, tips, "Excess of the residual by joint and part of the motion"),
             "strongest": found[:8],
-            "unit": torque_unit(diagnosis.units),
+            "units": units,
         }
 
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.diagnosis import Diagnosis, position_unit, torque_unit
+from sea_ident.discrepancy.diagnosis import Diagnosis, torque_unit, units_by_joint
 from sea_ident.discrepancy.findings import MissingEffect, Waveforms
 from sea_ident.report.chart import Band, Chart, Line, Mark, Points
 from sea_ident.report.section import DiagnosisSection
@@ -97,7 +97,7 @@ def _abscissa(
     joints = list(dict.fromkeys(name.rpartition(" ")[0] for name in waves.equations))
     joint = effect.joint if effect.joint in joints else waves.equations[equation].rpartition(" ")[0]
     i = min(joints.index(joint), waves.q.shape[1] - 1)
-    unit = position_unit({joint: units[joint]} if joint in units else {})
+    unit = units_by_joint(units, [joint], positions=True)[joint]
     speed = " or ".join(f"{part}/s" for part in unit.split(" or "))
     candidates = [
         (waves.dtheta[:, i], f"motor velocity of the {joint} [{speed}]"),
