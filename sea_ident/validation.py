@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.estimation import Agreement, Model
 from sea_ident.estimation.agreement import agreement
-from sea_ident.estimation.observations import Observations, friction_is_modelled
+from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.spring_agreement import SpringAgreement, spring_agreement
 from sea_ident.exceptions import RecordingError
 from sea_ident.one_thread import one_thread
@@ -158,7 +158,6 @@ def validate(
     tell("comparing the springs", 0.8)
     springs = spring_agreement(observations, model.values, model.springs, used)
     found += [spring.warning for spring in springs if spring.warning]
-    counted = friction_is_modelled(model.robot, model.effects, processed.motion) & used[:, None]
     noise = np.sqrt(processed.raw_tau_variance[used].mean(axis=0) / processed.periods)
     nrms = np.divide(rms, rms_torque, out=np.full_like(rms, np.inf), where=rms_torque > 0.0)
     return Validation(
@@ -172,7 +171,7 @@ def validate(
         processed=processed,
         predicted=predicted,
         used=used,
-        agreement=agreement(apart, np.array(each), counted),
+        agreement=agreement(apart, np.array(each), observations.judged & used[:, None]),
         warnings=tuple(found),
         units=tuple(joint.torque_unit for joint in model.robot.joints),
         springs=springs,

@@ -14,6 +14,7 @@ from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording, process
 from sea_ident.recordings import Recording
+from sea_ident.reversals import REVERSAL_SAMPLES, SLOWEST, UNCERTAIN_SIGN, around_mean_reversal
 from sea_ident.robot import Robot
 
 HIGHEST_FREQUENCY = 20.0
@@ -33,17 +34,6 @@ WIDEST_MARGIN = 2.4
 
 USED_SAMPLES = 0.8
 """Share of the harmonics that the samples have which the regressor keeps at most."""
-
-
-REVERSAL_SAMPLES = 2
-"""Samples to either side of a reversal of a motor that are left out of its equation."""
-
-SLOWEST = 0.02
-"""Samples slower than this share of the rms speed are left out of the equation of a motor."""
-
-
-UNCERTAIN_SIGN = 2.0
-"""Samples slower than this many times their scatter from period to period are left out too: a mean of signs is none."""
 
 STEP_DRAWS = 8
 """Other places of the steps of encoders that repeat in every period, for what they do to a torque."""
@@ -322,33 +312,16 @@ def around_reversals(
     samples: int = REVERSAL_SAMPLES,
     uncertain: float = UNCERTAIN_SIGN,
 ) -> NDArray[np.bool_]:
-    """(N, E) whether a motor (in its own equation a link) is about to reverse.
+    """(N, E) whether a motor (in its own equation a link) is about to reverse: see `around_mean_reversal`.
 
-    There a sample falls on one or the other side of a jump (of friction, of the efficiency of the gear) by a velocity
-    that is known no better than to its sign: no model of the mean can be right.
-
-    The scatter of the periods blurs a sign, and so do errors (K, 6, N, n) of the mean that are in all of them.
+    Errors (K, 6, N, n) of the mean are in all periods.
     """
     left_out = np.zeros((len(motion), len(equations)), dtype=np.bool_)
     for e, equation in enumerate(equations):
         kind = "dq" if equation.kind is EquationKind.LINK else "dtheta"
-        speed = getattr(motion, kind)[:, equation.index]
-        left_out[:, e] = around_reversal(speed, samples)
-        if len(periods) > 1:
-            spread = np.std([getattr(period, kind)[:, equation.index] for period in periods], axis=0, ddof=1)
-            if errors is not None:
-                repeated = errors[:, SIGNALS.index(kind), :, equation.index]
-                spread = np.hypot(spread, np.sqrt(np.mean(repeated**2)))
-            left_out[:, e] |= np.abs(speed) < uncertain * spread
-    return left_out
-
-
-def around_reversal(speed: FloatArray, samples: int = REVERSAL_SAMPLES) -> NDArray[np.bool_]:
-    """(N,) whether a speed (N,) is about to change its sign."""
-    left_out = np.abs(speed) < SLOWEST * float(np.sqrt(np.mean(speed**2)))
-    crossing = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, 1)))
-    for shift in range(-samples, samples):
-        left_out[(crossing + shift) % len(speed)] = True
+        speed, *each = (getattr(m, kind)[:, equation.index] for m in (motion, *periods))
+        repeated = None if errors is None else errors[:, SIGNALS.index(kind), :, equation.index]
+        left_out[:, e] = around_mean_reversal(speed, each, repeated, samples=samples, uncertain=uncertain)
     return left_out
 
 

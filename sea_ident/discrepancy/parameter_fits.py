@@ -8,7 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.columns import Evaluated
-from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversal, spectrum
+from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
 from sea_ident.discrepancy.fit import Fit, Known, Solution
 from sea_ident.discrepancy.free_samples import free_samples
 from sea_ident.discrepancy.free_shapes import free_shapes
@@ -19,6 +19,7 @@ from sea_ident.discrepancy.tangents import Tangents
 from sea_ident.discrepancy.whitening import Parts, Whitening
 from sea_ident.effects import Column, Effect
 from sea_ident.regressor import prior_parameters
+from sea_ident.reversals import around_reversal
 
 MOST_FIT_STEPS = 10
 """Largest number of steps of a fit; a model that is right needs two."""

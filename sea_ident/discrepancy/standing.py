@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sea_ident.discrepancy.data import UNCERTAIN_SIGN, EquationKind, PeriodData
+from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.reversals import UNCERTAIN_SIGN
 
 BESIDE_REVERSALS = 0
 """Caution of periods of which only that is left out around a reversal in which a motor stands."""

@@ -286,7 +286,7 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
         samples=processed.samples,
         periods=processed.periods,
         period=processed.period,
-        agreement=agreement(residual, scatter, observations.valid),
+        agreement=agreement(residual, scatter, observations.judged),
     )
     weighted = rows * estimate.weights[:, :, None]
     count = rows.shape[-1]
@@ -342,7 +342,7 @@ def _refitted(model: Model, observations: Observations) -> Model:
         fit=replace(
             model.fit,
             rms_residual=np.sqrt(np.mean(residual**2, axis=0)),
-            agreement=agreement(residual, scatter, observations.valid),
+            agreement=agreement(residual, scatter, observations.judged),
         ),
         excerpt=replace(
             model.excerpt,

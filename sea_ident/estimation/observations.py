@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
 from sea_ident.regressor import Regressor, build_regressor, build_total
+from sea_ident.reversals import around_mean_reversal
 from sea_ident.robot import Robot
 
 CHUNK = 20_000
@@ -96,16 +98,20 @@ def friction_is_modelled(robot: Robot, effects: Sequence[Effect], motion: Motion
     tanh(v / v_off) stands for the sign above 2 v_off (paper, eq. 3); below, friction is anything up to breakaway.
     """
     valid = np.ones(motion.q.shape, dtype=bool)
+    for effect, kind, index in _frictions(robot, effects):
+        valid[:, index] &= np.abs(getattr(motion, kind)[:, index]) > REVERSAL * effect.smoothing
+    return valid
+
+
+def _frictions(
+    robot: Robot, effects: Sequence[Effect]
+) -> Iterator[tuple[CoulombFriction | LinkFriction, Literal["dtheta", "dq"], int]]:
+    """Effects with a friction that jumps, the speed with whose sign it does, and the index of the joint."""
     for effect in effects:
         if isinstance(effect, CoulombFriction):
-            joint, speed = effect.required_joint, motion.dtheta
+            yield effect, "dtheta", robot.index(effect.required_joint)
         elif isinstance(effect, LinkFriction):
-            joint, speed = effect.required_joint, motion.dq
-        else:
-            continue
-        index = robot.index(joint)
-        valid[:, index] &= np.abs(speed[:, index]) > REVERSAL * effect.smoothing
-    return valid
+            yield effect, "dq", robot.index(effect.required_joint)
 
 
 def _chunks(
@@ -199,6 +205,20 @@ class Observations:
         valid = friction_is_modelled(self.robot, self.effects, self.processed.motion)
         # a joint that never leaves rest keeps its rows: there is nothing else of it
         return np.asarray(valid | ~np.any(valid, axis=0), dtype=np.bool_)
+
+    @cached_property
+    def judged(self) -> NDArray[np.bool_]:
+        """(N, n) where the residual says something about the model: there friction holds, and no reversal is near.
+
+        A fast joint passes the speeds at which friction does not hold between two samples, and those beside it have
+        the friction of either side.
+        """
+        motion, periods = self.processed.motion, self.processed.period_motions
+        judged = friction_is_modelled(self.robot, self.effects, motion)
+        for _, kind, index in _frictions(self.robot, self.effects):
+            speed, *each = (getattr(m, kind)[:, index] for m in (motion, *periods))
+            judged[:, index] &= ~around_mean_reversal(speed, each)
+        return judged
 
     def residual(self, values: FloatArray) -> FloatArray:
         """(N, n) torque less what the parameters (b,) explain [N m] or [N]."""
