@@ -11,7 +11,6 @@ from scipy.ndimage import binary_dilation
 from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.estimation import Agreement, Model
-from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.spring_agreement import SpringAgreement, spring_agreement
 from sea_ident.exceptions import RecordingError
@@ -171,7 +170,7 @@ def validate(
         processed=processed,
         predicted=predicted,
         used=used,
-        agreement=agreement(apart, np.array(each), observations.judged & used[:, None]),
+        agreement=observations.agreement(apart, np.array(each), used),
         warnings=tuple(found),
         units=tuple(joint.torque_unit for joint in model.robot.joints),
         springs=springs,

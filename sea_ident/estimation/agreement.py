@@ -18,7 +18,7 @@ class Agreement:
     """The mean residual away from reversals of velocity, and its noise.
 
     At rest friction is anything up to breakaway, and around a reversal it differs from pass to pass: there no model of
-    friction as a function of velocity can be right, and no sample counts.
+    friction as a function of velocity can be right, and no sample counts. What rings beside these is taken out.
 
     Attributes:
         rms: (n,) rms of the residual of the mean torque away from reversals [N m] or [N].

@@ -14,7 +14,6 @@ from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.state import Side
-from sea_ident.estimation.agreement import agreement
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.misplaced import misplaced_columns
@@ -286,7 +285,7 @@ def _model(observations: Observations, estimate: Estimate, uncertainty: Uncertai
         samples=processed.samples,
         periods=processed.periods,
         period=processed.period,
-        agreement=agreement(residual, scatter, observations.judged),
+        agreement=observations.agreement(residual, scatter),
     )
     weighted = rows * estimate.weights[:, :, None]
     count = rows.shape[-1]
@@ -342,7 +341,7 @@ def _refitted(model: Model, observations: Observations) -> Model:
         fit=replace(
             model.fit,
             rms_residual=np.sqrt(np.mean(residual**2, axis=0)),
-            agreement=agreement(residual, scatter, observations.judged),
+            agreement=observations.agreement(residual, scatter),
         ),
         excerpt=replace(
             model.excerpt,

@@ -14,10 +14,11 @@ from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Effect
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.link_friction import LinkFriction
+from sea_ident.estimation.agreement import Agreement, agreement
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
 from sea_ident.regressor import Regressor, build_regressor, build_total
-from sea_ident.reversals import around_mean_reversal
+from sea_ident.reversals import around_mean_reversal, without_ringing
 from sea_ident.robot import Robot
 
 CHUNK = 20_000
@@ -219,6 +220,20 @@ class Observations:
             speed, *each = (getattr(m, kind)[:, index] for m in (motion, *periods))
             judged[:, index] &= ~around_mean_reversal(speed, each)
         return judged
+
+    def agreement(
+        self, mean: FloatArray, periods: FloatArray, used: NDArray[np.bool_] | None = None
+    ) -> Agreement | None:
+        """How well a residual (N, n) and those of the periods (P, N, n) agree, among these samples (N,) or all."""
+        mean, periods = mean.copy(), periods.copy()
+        if self.processed.periodic and len(periods):
+            for i, joint in enumerate(self.robot.joints):
+                left_out = ~self.judged[:, i]
+                if 0 < np.count_nonzero(left_out) < len(left_out):
+                    harmonics = self.processed.motor_harmonics if joint.elastic else self.processed.link_harmonics
+                    mean[:, i] = without_ringing(mean[:, i], left_out, harmonics)
+                    periods[:, :, i] = without_ringing(periods[:, :, i], left_out, harmonics)
+        return agreement(mean, periods, self.judged if used is None else self.judged & used[:, None])
 
     def residual(self, values: FloatArray) -> FloatArray:
         """(N, n) torque less what the parameters (b,) explain [N m] or [N]."""

@@ -1,11 +1,18 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimation.synthetic import leg_series, record, truth_of
+from sea_ident.base_parameters import find_base_parameters
+from sea_ident.discrepancy.data import around_reversals, period_data
+from sea_ident.effects import base_effects
 from sea_ident.estimation import Agreement, identify
 from sea_ident.estimation.agreement import agreement
+from sea_ident.estimation.observations import Observations, friction_is_modelled
+from sea_ident.processing import process
+from sea_ident.reversals import around_reversal
 from sea_ident.robot import load_robot
 from sea_ident.validation import validate
 
@@ -81,3 +88,50 @@ def test_noise_of_encoders_is_noise_of_the_residual(leg):
     found = validate(model, record(leg, other, 8, seed=1, **noise), **how)
     assert found.agreement.within_noise.all()
     assert found.to_dict()["agreement"]["noise"]["knee"] == pytest.approx(found.agreement.noise[1])
+
+
+@pytest.fixture(scope="module")
+def recorded(leg):
+    """A motion, and eight periods of what sensors see of it."""
+    truth = truth_of(leg, leg_series())
+    return truth, record(leg, truth, 8, torque_noise=0.02)
+
+
+def with_torque(recording, joint, more):
+    """The recording with more torque (N,) in every period."""
+    name = f"tau_motor_{joint}"
+    columns = {**recording.columns, name: recording.columns[name] + np.tile(more, 8)}
+    return replace(recording, columns=columns)
+
+
+HOW = {"period": 10.0, "link_harmonics": 150, "motor_harmonics": 150}
+
+
+def test_the_samples_that_count_are_those_of_a_diagnosis(leg, recorded):
+    processed = process(recorded[1], leg, **HOW)
+    effects = base_effects(leg)
+    observations = Observations(leg, effects, find_base_parameters(leg, effects), processed)
+    data = period_data(processed, leg)
+    around = around_reversals(processed.motion, data.equations, processed.period_motions)
+    motors = [k for k, equation in enumerate(data.equations) if equation.kind == "motor"]
+    holds = friction_is_modelled(leg, effects, processed.motion)
+    np.testing.assert_array_equal(observations.judged, holds & ~around[:, motors])
+    assert np.any(holds & around[:, motors])
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_what_rings_from_reversals_is_no_gap_and_what_does_not_is(leg, recorded):
+    truth, recording = recorded
+    speed = truth.motion.dtheta[:, leg.index("hip")]
+    pulses = np.random.default_rng(5).normal(size=len(speed))
+    pulses = np.fft.rfft(np.where(around_reversal(speed), pulses, 0.0))
+    pulses[HOW["motor_harmonics"] + 1 :] = 0.0
+    rings = np.fft.irfft(pulses, len(speed))
+    assert np.sqrt(np.mean(rings[~around_reversal(speed)] ** 2)) > 2.0 * 0.02 / np.sqrt(8.0)
+    model = identify(leg, with_torque(recording, "hip", rings), **HOW)
+    assert model.fit.agreement.within_noise.all()
+    assert validate(model, with_torque(recording, "hip", rings), **HOW).agreement.within_noise.all()
+    wave = 0.05 * np.sin(2.0 * np.pi * 37.0 * np.arange(len(speed)) / len(speed))
+    fit = identify(leg, with_torque(recording, "hip", wave), **HOW).fit
+    assert fit.agreement.within_noise.tolist() == [False, True, True]
+    assert fit.agreement.gap[0] == pytest.approx(0.05 / np.sqrt(2.0), rel=0.1)
