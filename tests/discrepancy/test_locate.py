@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.conclude import _per_joint
+from sea_ident.discrepancy.conclude import _per_joint, _waveforms
 from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.gap import excess_power, gap_of, noise_of_residual, per_joint
 from sea_ident.discrepancy.lack import lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate, regimes
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 
 SIZE = 0.5
@@ -152,6 +153,11 @@ def test_noise_follows_the_spring_that_the_residual_is_measured_by(nothing_missi
         excess_power(bench, soft, now.noise) * softer**2, excess_power(bench, stiff, now.noise), rtol=1e-9, atol=1e-12
     )
     assert gap_of(bench, soft, soft, now.noise).noise["knee"] < gap_of(bench, stiff, stiff, now.noise).noise["knee"]
+    drawn = [
+        _waveforms(bench, fit, fit, now.noise, Selection(Settled(fit, now.noise), Settled(fit, now.noise), 0, ()))
+        for fit in (soft, stiff)
+    ]
+    np.testing.assert_allclose(drawn[0].noise * softer, drawn[1].noise)
     of_both = [_per_joint(bench, Settled(fit, now.noise))["knee"]["link"] for fit in (soft, stiff)]
     assert of_both[0] == pytest.approx(of_both[1])
     places = [[p for p in locate(bench, fit, now.noise) if p.joint == "knee"] for fit in (soft, stiff)]
