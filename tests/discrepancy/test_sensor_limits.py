@@ -76,6 +76,15 @@ def test_steps_that_repeat_are_in_the_floor_and_nothing_is_looked_for_below_it(
 
 
 @pytest.mark.scenario
+def test_a_floor_and_a_fit_follow_each_other_until_the_floor_has_room_for_the_steps(laboratory):
+    """The first fit, in white noise, has hardly any inertia, and steps do next to nothing in it."""
+    bench = laboratory.bench(laboratory.record(periods=12, sensors=steps_of(12)))
+    settled = settle(bench, bench.effects)
+    assert bench.share_of_steps(settled.fit, settled.noise) <= CONSISTENT
+    assert lack_of_fit(bench, settled)[2] > 0.01
+
+
+@pytest.mark.scenario
 @pytest.mark.parametrize("bits", [12, 14])
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_coarse_encoders_are_told_and_nothing_is_named(laboratory, coarse, bits):
