@@ -1,5 +1,6 @@
 """What sensors cannot show is no missing effect."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -85,13 +86,17 @@ def test_a_floor_and_a_fit_follow_each_other_until_the_floor_has_room_for_the_st
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize("bits", [12, 14])
+@pytest.mark.parametrize(("bits", "looked_for"), [(12, False), (14, True)])
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
-def test_coarse_encoders_are_told_and_nothing_is_named(laboratory, coarse, bits):
+def test_coarse_encoders_are_told_and_nothing_is_named(laboratory, coarse, bits, looked_for, monkeypatch):
+    searches, module = [], importlib.import_module("sea_ident.discrepancy.diagnose")
+    searched = module._searched
+    monkeypatch.setattr(module, "_searched", lambda *given: searches.append(given) or searched(*given))
     model = identify(laboratory.leg, coarse[bits], period=PERIOD)
     found = diagnose(model, coarse[bits], holdout=laboratory.record(sensors=steps_of(bits)))
     assert found.verdict is Verdict.NONE
     assert found.missing == ()
+    assert bool(searches) == looked_for
     told = [text for text in found.warnings if "encoder steps do not average out" in text]
     assert len(told) == 1
     assert "q_hip" in told[0]
