@@ -9,10 +9,13 @@ import pytest
 from sea_ident import identify
 from sea_ident.discrepancy import Verdict, diagnose
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.closing import SIGNALS
+from sea_ident.discrepancy.data import EquationKind, around_reversals, wide_processing
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.noise import REPEATED_VARIANCE, noise_from_steps, step_freedom
 from sea_ident.discrepancy.sensor_limits import HARDLY, MOST, WORTH_A_WORD, hardly_deflected, limits, steps_cover
 from sea_ident.discrepancy.settle import CONSISTENT, settle
+from sea_ident.reversals import UNCERTAIN_SIGN
 from sea_ident.simulation import SensorNoise
 
 PERIOD = 5.0
@@ -74,6 +77,24 @@ def test_steps_that_repeat_are_in_the_floor_and_nothing_is_looked_for_below_it(
     assert without.fit.statistic / without.fit.dof > blind_to * statistic / dof
     assert blind.share_of_steps(without.fit, without.noise) == 0.0
     assert not steps_cover(blind, without)
+
+
+@pytest.mark.scenario
+def test_a_velocity_that_steps_blur_has_fewer_harmonics_and_no_sign_near_its_reversals(laboratory, coarse, monkeypatch):
+    data = laboratory.data(coarse[12])
+    told, blind = (
+        around_reversals(data.motion, data.equations, data.period_motions, errors)
+        for errors in (data.step_errors, None)
+    )
+    np.testing.assert_array_equal(told & blind, blind)
+    assert told.sum() > blind.sum()
+    for e, equation in enumerate(data.equations):
+        kind = "dq" if equation.kind is EquationKind.LINK else "dtheta"
+        error = np.sqrt(np.mean(data.step_errors[:, SIGNALS.index(kind), :, equation.index] ** 2))
+        assert np.all(told[np.abs(getattr(data.motion, kind)[:, equation.index]) < UNCERTAIN_SIGN * error, e])
+    kept = wide_processing(coarse[14], laboratory.leg, PERIOD).link_harmonics
+    monkeypatch.setattr("sea_ident.discrepancy.data._step_errors", lambda *given: None)
+    assert kept < wide_processing(coarse[14], laboratory.leg, PERIOD).link_harmonics
 
 
 @pytest.mark.scenario
