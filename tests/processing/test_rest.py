@@ -4,25 +4,14 @@ import warnings
 
 import numpy as np
 import pytest
-from estimation.synthetic import leg_series, record, truth_of
+from estimation.synthetic import record
 
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import process
 from sea_ident.processing.rest import without_rest, without_stop
 from sea_ident.recordings import Recording
-from sea_ident.robot import load_robot
 
 INTERVAL = 0.005
-
-
-@pytest.fixture(scope="module")
-def leg():
-    return load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
-def truth(leg):
-    return truth_of(leg, leg_series())
 
 
 @pytest.fixture(scope="module")

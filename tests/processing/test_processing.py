@@ -1,21 +1,10 @@
 import numpy as np
 import pytest
-from estimation.synthetic import leg_series, record, truth_of
+from estimation.synthetic import record
 
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.processing import process
 from sea_ident.recordings import Recording
-from sea_ident.robot import load_robot
-
-
-@pytest.fixture(scope="module")
-def leg():
-    return load_robot("exo_leg")
-
-
-@pytest.fixture(scope="module")
-def truth(leg):
-    return truth_of(leg, leg_series())
 
 
 def test_mean_motion_and_derivatives(leg, truth):
