@@ -1,10 +1,15 @@
-"""Linear algebra on one thread: the matrices here are small, and threads inside it would wait for each other."""
+"""Linear algebra on one thread.
+
+The matrices here are small, and threads inside it would wait for each other. A copy of this process has none of the
+threads of OpenMP, and would wait for them without end where it is told to use several.
+"""
 
 from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
-import scipy.linalg  # noqa: F401 - its library, and that of numpy, must be loaded to be found
+import proxsuite  # noqa: F401 - it brings OpenMP, which must be loaded to be found
+import scipy.linalg  # noqa: F401 - as must its library, and that of numpy
 from threadpoolctl import ThreadpoolController
 
 _Given = ParamSpec("_Given")
@@ -21,7 +26,7 @@ def one_thread(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
 
     @wraps(function)
     def held(*args: _Given.args, **kwargs: _Given.kwargs) -> _Found:
-        with _LIBRARIES.limit(limits=1, user_api="blas"):
+        with _LIBRARIES.limit(limits=1):
             return function(*args, **kwargs)
 
     return held

@@ -1,5 +1,7 @@
 """The linear algebra of a process runs on one thread while the library works, and on as many as before after it."""
 
+import os
+import sys
 import warnings
 
 import numpy as np
@@ -7,19 +9,22 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import sea_ident
+from sea_ident import side_by_side as module
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.excitation.quadratic import solve_quadratic
 from sea_ident.one_thread import one_thread
 from sea_ident.recordings import Recording
+from sea_ident.side_by_side import shared, side_by_side
 
 
 def counts():
-    """Threads of every library of linear algebra that is loaded."""
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+    """Threads of every library of linear algebra that is loaded, and of OpenMP within them."""
+    return {library["num_threads"] for library in threadpool_info()}
 
 
 @pytest.fixture(autouse=True)
 def two_threads():
-    with threadpool_limits(limits=2, user_api="blas"):
+    with threadpool_limits(limits=2):
         if counts() != {2}:
             pytest.skip(f"the linear algebra here does not take two threads: {threadpool_info()}")
         yield
@@ -54,6 +59,24 @@ def test_what_a_call_raises_ends_it():
     with pytest.raises(ValueError, match="no"):
         fails()
     assert counts() == {2}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process is copied on Linux alone")
+def test_a_copy_of_a_process_that_used_several_threads_does_not_wait_for_them(monkeypatch):
+    # a quadratic program of this size goes to several threads of OpenMP where it may
+    rng = np.random.default_rng(0)
+    factor, rows = rng.normal(size=(300, 300)), rng.normal(size=(1200, 300))
+    problem = factor @ factor.T + np.eye(300), rng.normal(size=300), rows, np.full(1200, -0.1), np.full(1200, 0.1)
+    solve_quadratic(*problem)
+    monkeypatch.setattr(module, "_cores", lambda: 2)
+    monkeypatch.setattr(module, "LONGEST_WAIT", 20.0)
+
+    def solved(turn):
+        solve_quadratic(*problem)
+        return os.getpid()
+
+    solvers = one_thread(shared(lambda: list(side_by_side(solved, range(6)))))()
+    assert len(set(solvers)) == 2
 
 
 class Asked(Exception):
