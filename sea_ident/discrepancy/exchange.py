@@ -1,18 +1,20 @@
 """Effects that were added, replaced by better ones now that the others are there."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Generator
 from dataclasses import dataclass
+from itertools import islice
 from typing import TypeAlias
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan, sought
 from sea_ident.discrepancy.columns import Key, effect_key
-from sea_ident.discrepancy.fit import Solution
+from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import at_a_bound, comes_first, is_push, penalty, slowest, too_short
 from sea_ident.discrepancy.physics import physical
-from sea_ident.discrepancy.refit import of_every_kind, refitted
+from sea_ident.discrepancy.refit import AT_ONCE, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects import Effect
 from sea_ident.side_by_side import side_by_side
 
 RIGHT = 1.2
@@ -68,76 +70,134 @@ def exchange(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Co
     """
     position, last = len(now.fit.effects) - added, len(now.fit.effects)
     while position < last:
-        challenge = _Challenge(bench, now, dict(tried), ruled_out)
-        for challenged in side_by_side(challenge, range(position, last)):
-            position += 1
-            tried.update(challenged.tried)
-            if challenged.better is not None:
-                # what comes after it is to be held against what there is now
-                now = settle_again(bench, bench.again(challenged.better, now.noise))
-                break
+        position, better = _first_better(bench, now, range(position, last), tried, ruled_out)
+        if better is not None:
+            # what comes after it is to be held against what there is now
+            now = settle_again(bench, bench.again(better, now.noise))
     return now
 
 
+def _first_better(
+    bench: Bench, now: Settled, positions: range, tried: Tried, ruled_out: Collection[Key]
+) -> tuple[int, Solution | None]:
+    """The place after the first in which another effect is better, and the best model with another there.
+
+    The outcome is the same whether there are cores for two at a time or not.
+    """
+    matches = _matches(bench, now, positions, tried, ruled_out)
+    position, better = positions.start, None
+    price = _price(bench, now.fit, position)
+    while pair := list(islice(matches, AT_ONCE)):
+        prices = [price if m.position == position else _price(bench, now.fit, m.position) for m in pair]
+        outcomes = side_by_side(_Trial(bench, now), list(zip(pair, prices, strict=True)))
+        for match, own in zip(pair, prices, strict=True):
+            if match.position != position:
+                if better is not None:
+                    break
+                position, price = match.position, own
+            outcome = next(outcomes)
+            tried[match.own, match.key] = Outdone(match.promised, outcome.gain / match.explained)
+            if outcome.possible and outcome.price < price - now.fit.unit:
+                price, better = outcome.price, outcome.solution
+        outcomes.close()
+        if better is not None and pair[-1].position != position:
+            break
+    return (positions.stop, None) if better is None else (position + 1, better)
+
+
 @dataclass(frozen=True, eq=False)
-class _Challenged:
-    """What came of trying others in the place of an effect.
+class _Match:
+    """An effect that was added, and another one that is tried in its place.
 
     Attributes:
-        better: the model with the best of them, None where none is better.
-        tried: what did not take its place.
+        position: of the one that was added.
+        own: what it is.
+        key: what the other one is.
+        effect: the other one.
+        promised: share of what the one explains that the other promises to explain [-].
+        explained: drop of the statistic by the one.
+        reduced: the model without either.
     """
 
-    better: Solution | None
-    tried: Tried
+    position: int
+    own: Key
+    key: Key
+    effect: Effect
+    promised: float
+    explained: float
+    reduced: Fit
+
+
+def _matches(
+    bench: Bench, now: Settled, positions: range, tried: Tried, ruled_out: Collection[Key]
+) -> Generator[_Match, None, None]:
+    """All that is worth trying, place by place."""
+    fit, noise = now.fit, now.noise
+    for position in positions:
+        effect = fit.effects[position]
+        if fit.statistic < RIGHT * fit.dof and not slowest(effect):
+            continue
+        own = effect_key(effect)
+        others = [e for k, e in enumerate(fit.effects) if k != position]
+        reduced = bench.fit(others, noise, start=fit.parameters)
+        explained = max(reduced.statistic - fit.statistic, 1e-300)
+        scanned = scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
+        rivals = [c for c in scanned if c.key != own and c.key not in ruled_out]
+        for candidate in of_every_kind(rivals, CHALLENGERS, effect.joint):
+            promised = candidate.gain / explained
+            last = tried.get((own, candidate.key))
+            if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
+                continue
+            if last is None or last.again(promised):
+                yield _Match(position, own, candidate.key, candidate.effect, promised, explained, reduced)
+
+
+def _price(bench: Bench, fit: Fit, position: int) -> float:
+    """Statistic of a model and the price of the parameters of one of its effects."""
+    return fit.statistic + fit.unit * penalty(fit.effects[position], bench)
 
 
 @dataclass(frozen=True, eq=False)
-class _Challenge:
-    """Tries others in the place of an effect that was added.
+class _Outcome:
+    """What came of an effect that was tried in the place of another.
+
+    Attributes:
+        solution: the model with it.
+        gain: drop of the statistic by it, nothing where it cannot be.
+        price: statistic and the price of its parameters.
+        possible: whether it may take the place.
+    """
+
+    solution: Solution
+    gain: float
+    price: float
+    possible: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Tries an effect in the place of another.
 
     Attributes:
         bench: the recording.
         now: the model.
-        tried: what did not take the place of another before.
-        ruled_out: effects that are not tried.
     """
 
     bench: Bench
     now: Settled
-    tried: Tried
-    ruled_out: Collection[Key]
 
-    def __call__(self, position: int) -> _Challenged:
-        """Try others in the place of the effect at a position."""
-        bench, fit, noise = self.bench, self.now.fit, self.now.noise
-        tried: Tried = {}
-        if fit.statistic < RIGHT * fit.dof and not slowest(fit.effects[position]):
-            return _Challenged(None, tried)
-        own = effect_key(fit.effects[position])
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        reduced = bench.fit(others, noise, start=fit.parameters)
-        explained = max(reduced.statistic - fit.statistic, 1e-300)
-        lawless = is_push(fit.effects[position])
-        best, scanned = fit, scan(bench, reduced, noise, instead_of=sought(reduced, fit, noise))
-        rivals = [c for c in scanned if c.key != own and c.key not in self.ruled_out]
-        for candidate in of_every_kind(rivals, CHALLENGERS, fit.effects[position].joint):
-            promised = candidate.gain / explained
-            last = self.tried.get((own, candidate.key))
-            if promised < (LEAST_OF_A_SIGNAL if is_signal(candidate.effect) else 0.5):
-                continue
-            if last is not None and not last.again(promised):
-                continue
-            better = best.statistic + fit.unit * (penalty(best.effects[position], bench) - 1.0)
-            beat = better - fit.unit * penalty(candidate.effect, bench)
-            new = refitted(bench, others[:position], candidate.effect, others[position:], noise, fit.parameters, beat)
-            ended, slack = new.effects[position], len(bench.slack_links(new)) > len(bench.slack_links(fit))
-            ends = at_a_bound(ended) or slowest(ended) or too_short(bench, ended)
-            possible = not (slack or ends) and physical(bench, new, position)
-            gain = reduced.statistic - new.statistic if possible else 0.0
-            tried[own, candidate.key] = Outdone(promised, gain / explained)
-            if is_push(candidate.effect) and not lawless:
-                possible = comes_first(gain, explained, reduced)
-            if possible and new.statistic + fit.unit * penalty(new.effects[position], bench) < better:
-                best = new
-        return _Challenged(None if best is fit else best.solution, tried)
+    def __call__(self, tried: tuple[_Match, float]) -> _Outcome:
+        """Refit the model with another effect, which is of interest below a price."""
+        (match, price), bench, fit, noise = tried, self.bench, self.now.fit, self.now.noise
+        position, reduced = match.position, match.reduced
+        before, after = reduced.effects[:position], reduced.effects[position:]
+        beat = price - fit.unit * (1.0 + penalty(match.effect, bench))
+        new = refitted(bench, before, match.effect, after, noise, fit.parameters, beat)
+        ended, slack = new.effects[position], len(bench.slack_links(new)) > len(bench.slack_links(fit))
+        ends = at_a_bound(ended) or slowest(ended) or too_short(bench, ended)
+        possible = not (slack or ends) and physical(bench, new, position)
+        gain = reduced.statistic - new.statistic if possible else 0.0
+        if is_push(match.effect) and not is_push(fit.effects[position]):
+            possible = comes_first(gain, match.explained, reduced)
+        # in the unit of the model that it is compared with
+        return _Outcome(new.solution, gain, new.statistic + fit.unit * penalty(ended, bench), possible)

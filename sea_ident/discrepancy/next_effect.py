@@ -28,7 +28,7 @@ from sea_ident.discrepancy.judge import (
     torque_changes,
 )
 from sea_ident.discrepancy.physics import is_term, possible
-from sea_ident.discrepancy.refit import of_every_kind, refitted
+from sea_ident.discrepancy.refit import AT_ONCE, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
@@ -72,9 +72,6 @@ FINALISTS = 4
 
 MOST_FINALISTS = 7
 """... and up to so many where they promise about as much as the best of them."""
-
-AT_ONCE = 2
-"""Candidates that are refitted at a time, whether there are cores for them or not: so the outcome is the same."""
 
 LAST_TWO = 2
 """Of the candidates the best are compared with the shapes of the model refined too."""
