@@ -269,3 +269,17 @@ def test_cases_follow_from_their_seed_and_survive_json() -> None:
     assert case == draw_case(11, "none", 2)
     assert case != draw_case(12, "none", 2)
     assert Case.from_dict(case.to_dict()) == case
+
+
+def test_coarse_encoders_have_steps_far_above_their_noise_and_half_the_cases_hide_nothing() -> None:
+    cases = [draw_case(11, "coarse", k) for k in range(6)]
+    assert [len(case.planted) for case in cases] == [0, 1, 0, 1, 0, 1]
+    for case in cases:
+        bits = [np.log2(2.0 * np.pi / step) for step in (case.noise.link_step, case.noise.motor_step)]
+        assert bits == pytest.approx(np.round(bits))
+        assert 12 <= bits[0] <= 16
+        assert 15 <= bits[1] <= 18
+        assert case.noise.link_step > 2.0 * case.noise.link_encoder
+    # what is drawn in the other rows does not depend on it
+    fine = draw_case(11, "one", 1).noise
+    assert fine.link_step < 2.0 * fine.link_encoder

@@ -92,6 +92,22 @@ def test_table_counts_and_marks_goals(tmp_path: Path) -> None:
     assert "torque_ripple @ hip" in (tmp_path / "misses.txt").read_text()
 
 
+def test_cases_of_coarse_encoders_count_by_whether_something_is_hidden(tmp_path: Path) -> None:
+    wrong = said(("torque_ripple", "hip"))
+    scores = [
+        scored(tmp_path, (RIPPLE,), said(("torque_ripple", "knee")), row="coarse", index=1),
+        scored(tmp_path, (RIPPLE,), wrong, row="coarse", index=3),
+        scored(tmp_path, (), {"verdict": "none", "missing": []}, row="coarse", index=0),
+        scored(tmp_path, (), wrong, row="coarse", index=2),
+        scored(tmp_path, (), {**wrong, "verdict": "suspect"}, row="coarse", index=4),
+    ]
+    lines = {line.what: line for line in lines_of(scores) if line.row == "coarse"}
+    counts = {what: (lines[what].successes, lines[what].trials, lines[what].met) for what in (
+        "effect and joint named", "false names with confidence", "nothing missing, something named",
+        "nothing missing, any name, suspect or ambiguous included", "nothing missing, verdict none")}  # fmt: skip
+    assert list(counts.values()) == [(1, 2, True), (1, 2, False), (1, 3, False), (2, 3, False), (1, 3, True)]
+
+
 def test_the_table_tells_how_long_diagnoses_take(tmp_path: Path) -> None:
     """Ten of 1 to 10 s and one of 30 s: by its median alone a goal is met that some diagnoses miss by far."""
     told = [*(float(k) for k in range(1, 11)), 30.0]

@@ -34,6 +34,7 @@ class Row:
         number: stands for the row in seeds.
         entries: what can be hidden.
         weak: whether the excitation is weak.
+        coarse: whether the steps of the encoders are far above their noise; half of the cases hide nothing then.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Row:
     number: int
     entries: tuple[Entry, ...] = ()
     weak: bool = False
+    coarse: bool = False
 
 
 ROWS = {
@@ -55,6 +57,7 @@ ROWS = {
         Row("removed", "true effect taken out of the library", 6, LIBRARY),
         Row("other_form", "form differs from the library", 7, OTHER_FORMS),
         Row("weak", "weak excitation", 8, LIBRARY, weak=True),
+        Row("coarse", "encoders of few bits, nothing or one effect", 10, LIBRARY, coarse=True),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }
@@ -115,11 +118,11 @@ def draw_case(seed: int, row: str, index: int) -> Case:
         # a ramp, or friction that sticks, is no base model: where a motor stands still for some samples, that shows
         friction_form="tanh",
         friction_smoothing=_log(rng, 0.003, 0.02),
-        noise=_noise(rng),
+        noise=_noise(rng, what.coarse),
         planted=(),
         reference=row == "reference",
     )
-    if not what.entries:
+    if not what.entries or (what.coarse and index % 2 == 0):
         return replace(case, engine="project" if rng.random() < PROJECT_ENGINE_SHARE else "mujoco")
     gauge = Gauge(truth_of(case), trajectories_of(case)[0], friction_without_jitter(case), settling(robot))
     planted = _hide(case, gauge, rng)
@@ -129,9 +132,9 @@ def draw_case(seed: int, row: str, index: int) -> Case:
     return replace(case, planted=planted, forbidden=forbidden)
 
 
-def _noise(rng: np.random.Generator) -> Noise:
+def _noise(rng: np.random.Generator, coarse: bool) -> Noise:
     link, motor = _log(rng, 5e-6, 4e-5), _log(rng, 2e-6, 1.5e-5)
-    return Noise(
+    noise = Noise(
         link_encoder=link,
         motor_encoder=motor,
         link_step=_encoder_step(link),
@@ -141,6 +144,11 @@ def _noise(rng: np.random.Generator) -> Noise:
         jitter=_log(rng, 0.02, 0.2),
         jitter_speed=_log(rng, 0.03, 0.1),
     )
+    if not coarse:
+        return noise
+    # that of a motor turns many times while its joint turns once
+    link_bits, motor_bits = rng.integers(12, 17), rng.integers(15, 19)
+    return replace(noise, link_step=float(2.0 * np.pi / 2**link_bits), motor_step=float(2.0 * np.pi / 2**motor_bits))
 
 
 def _encoder_step(noise: float) -> float:

@@ -94,8 +94,13 @@ def lines_of(scores: list[Score]) -> list[Line]:
             mean = float(np.mean(ratios))
             add(Line("none", f"statistic over degrees of freedom, mean, P = {periods}", "-", value=mean, met=True))
         add(_share("none", f"verdict none, P = {periods}", "-", (s.verdict == "none" for s in none), lambda x: True))
-    for row in ("one", "one_small", "other_form", "weak"):
-        _single(row, by_row[row], add)
+    for row in ("one", "one_small", "other_form", "weak", "coarse"):
+        _single(row, [s for s in by_row[row] if s.case.planted], add)
+    nothing = [s for s in by_row["coarse"] if not s.case.planted]
+    add(_share("coarse", "nothing missing, something named", "<= 1 %", (s.named for s in nothing), lambda x: x <= 0.01))
+    add(_share("coarse", "nothing missing, any name, suspect or ambiguous included", "<= 1 %",
+               (bool(s.found) for s in nothing), lambda x: x <= 0.01))  # fmt: skip
+    add(_share("coarse", "nothing missing, verdict none", "-", (s.verdict == "none" for s in nothing), lambda x: True))
     two = by_row["two"]
     add(_share("two", "recall", ">= 85 %", (s.finder(p) is not None for s in two for p in s.case.planted),
                lambda x: x >= 0.85))  # fmt: skip
@@ -158,6 +163,7 @@ def _single(row: str, cases: list[Score], add: Callable[[Line], None]) -> None:
         "one_small": (">= 81 %", 0.81, "-", 0.0),
         "other_form": (">= 85 %", 0.85, "-", 0.0),
         "weak": ("-", 0.0, "-", 0.0),
+        "coarse": ("-", 0.0, "-", 0.0),
     }
     named, named_limit, declared, declared_limit = goals[row]
     add(_share(row, "seen", {"one_small": ">= 85 %", "weak": ">= 83 %"}.get(row, "-"), (s.seen for s in cases),
