@@ -284,6 +284,8 @@ def _data_of(data: PeriodData, robot: Robot, series: FourierSeries, motors: Pred
         channels={},
         left_out=around_reversals(motion, data.equations),
         known=None,
+        places=(),
+        step_errors=None,
     )
 
 

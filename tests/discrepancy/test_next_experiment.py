@@ -8,6 +8,7 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.next_experiment import _data_of, _identified
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
@@ -57,9 +58,14 @@ def test_a_stiffness_below_zero_predicts_no_deflection():
     assert "knee" not in motors.cubic_stiffness
 
 
-def test_what_drifts_in_the_recording_is_not_in_the_proposed_motion(nothing_missing, laboratory):
-    """It has other samples and no torque of its own."""
-    data = replace(nothing_missing[0].data, known=np.ones((nothing_missing[0].data.samples, 6)))
+def test_what_belongs_to_the_periods_of_the_recording_is_not_in_the_proposed_motion(nothing_missing, laboratory):
+    """It has other samples, no torque of its own, no periods, and no steps of encoders."""
+    bench = nothing_missing[0]
+    samples, n = bench.data.motion.q.shape
+    known, errors = np.ones((samples, 6)), np.full((4, 6, samples, n), 1e-4)
+    data = replace(bench.data, known=known, step_errors=errors, places=tuple(range(1, 1 + bench.data.periods)))
     proposed = _data_of(data, laboratory.leg, laboratory.motions[1], None)
     assert proposed.samples < data.samples
     np.testing.assert_array_equal(proposed.target(proposed.tau_motor), 0.0)
+    assert len(proposed.starts) == proposed.periods == 0
+    assert np.all(np.isfinite(Bench(proposed, laboratory.effects).design(laboratory.effects)))
