@@ -74,7 +74,7 @@ def true_parameters(truth: Truth, effects: tuple[Effect, ...]) -> np.ndarray:
     return np.concatenate(values)
 
 
-@pytest.mark.parametrize("name", ["exo_leg", "baxter"])
+@pytest.mark.parametrize("name", ["exo_leg", "baxter", "prosthesis"])
 def test_mujoco_plant_obeys_link_and_motor_rows(name: str) -> None:
     """Rotors are bodies of MuJoCo's, so the coupling terms of the library are checked by another engine."""
     truth, exact = truth_and_run(name)
@@ -88,7 +88,7 @@ def test_mujoco_plant_obeys_link_and_motor_rows(name: str) -> None:
     assert np.sqrt(np.mean(motor**2, axis=0)).max() < 1e-4
 
 
-@pytest.mark.parametrize("name", ["exo_leg", "ur5"])
+@pytest.mark.parametrize("name", ["exo_leg", "ur5", "oblique_arm", "torso"])
 def test_regression_on_mujoco_states_recovers_base_parameters(name: str) -> None:
     truth, exact = truth_and_run(name)
     effects = sum_model(truth)
@@ -283,3 +283,20 @@ def test_coarse_encoders_have_steps_far_above_their_noise_and_half_the_cases_hid
     # what is drawn in the other rows does not depend on it
     fine = draw_case(11, "one", 1).noise
     assert fine.link_step < 2.0 * fine.link_encoder
+
+
+def test_other_robots_take_turns_with_and_without_something_hidden() -> None:
+    cases = [draw_case(11, "others", k) for k in range(6)]
+    assert [(case.robot, len(case.planted)) for case in cases] == [
+        ("prosthesis", 0), ("oblique_arm", 1), ("torso", 0), ("prosthesis", 1), ("oblique_arm", 0), ("torso", 1),
+    ]  # fmt: skip
+
+
+def test_another_joint_is_one_of_the_same_chain() -> None:
+    rng = generator(9, 11)
+    torso = gap.Gauge(drawn_truth("torso", rng), draw_trajectory("torso", 4.0, rng, candidates=2),
+                      Friction("tanh", SMOOTHING), 2)  # fmt: skip
+    names = torso.truth.robot.joint_names
+    others = {name: names[catalogue.Place(torso, k, rng).other] for k, name in enumerate(names)}
+    assert others == {"waist": "r_shoulder", "l_shoulder": "l_elbow", "l_elbow": "l_shoulder",
+                      "r_shoulder": "r_elbow", "r_elbow": "r_shoulder"}  # fmt: skip

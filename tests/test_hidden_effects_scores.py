@@ -70,6 +70,11 @@ def test_two_effects_of_equal_data_count_as_one_at_the_last_joint_only(tmp_path:
         planted = replace(RIPPLE, effect="spring_offset", joint=joint)
         score = scored(tmp_path, (planted,), said(("encoder_offset", joint)))
         assert (score.finder(planted) is not None) is equal
+    for joint, equal in (("l_elbow", True), ("r_shoulder", False)):
+        planted = replace(RIPPLE, effect="spring_offset", joint=joint)
+        score = scored(tmp_path, (planted,), said(("encoder_offset", joint)))
+        branched = replace(score, case=replace(score.case, robot="torso"))
+        assert (branched.finder(planted) is not None) is equal
 
 
 def test_nothing_missing_and_failed_diagnoses(tmp_path: Path) -> None:

@@ -51,9 +51,8 @@ class Place:
 
     @property
     def other(self) -> int:
-        """Another joint, a neighbour."""
-        n = self.gauge.truth.robot.n
-        return self.joint + 1 if self.joint + 1 < n else self.joint - 1
+        """Another joint, a neighbour: one after it where there is any."""
+        return max(self.gauge.truth.robot.neighbours(self.joint))
 
     def phase(self) -> float:
         """Any angle."""

@@ -34,7 +34,9 @@ class Row:
         number: stands for the row in seeds.
         entries: what can be hidden.
         weak: whether the excitation is weak.
-        coarse: whether the steps of the encoders are far above their noise; half of the cases hide nothing then.
+        half: whether half of the cases hide nothing.
+        coarse: whether the steps of the encoders are far above their noise.
+        robots: that take turns; the leg most of the time where there are none.
     """
 
     name: str
@@ -42,7 +44,9 @@ class Row:
     number: int
     entries: tuple[Entry, ...] = ()
     weak: bool = False
+    half: bool = False
     coarse: bool = False
+    robots: tuple[str, ...] = ()
 
 
 ROWS = {
@@ -57,7 +61,9 @@ ROWS = {
         Row("removed", "true effect taken out of the library", 6, LIBRARY),
         Row("other_form", "form differs from the library", 7, OTHER_FORMS),
         Row("weak", "weak excitation", 8, LIBRARY, weak=True),
-        Row("coarse", "encoders of few bits, nothing or one effect", 10, LIBRARY, coarse=True),
+        Row("coarse", "encoders of few bits, nothing or one effect", 10, LIBRARY, half=True, coarse=True),
+        Row("others", "other robots, nothing or one effect", 11, LIBRARY, half=True,
+            robots=("prosthesis", "oblique_arm", "torso")),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }
@@ -84,7 +90,7 @@ def trajectories_of(case: Case) -> tuple[FourierSeries, FourierSeries]:
 
 def settling(robot: str) -> int:
     """Periods until a robot moves periodically."""
-    return 2 if robot == "baxter" else 1
+    return 1 if robot in ("exo_leg", "ur5") else 2
 
 
 def draw_case(seed: int, row: str, index: int) -> Case:
@@ -104,6 +110,8 @@ def draw_case(seed: int, row: str, index: int) -> Case:
     what, rng = ROWS[row], row_generator(seed, row, index)
     # one in ten on the arm with springs, one in ten on the rigid arm, in an order of its own for every row
     robot = {3: "baxter", 7: "ur5"}.get((index + 3 * what.number) % 10, "exo_leg")
+    if what.robots:
+        robot = what.robots[index % len(what.robots)]
     case = Case(
         row=row,
         seed=seed,
@@ -122,7 +130,7 @@ def draw_case(seed: int, row: str, index: int) -> Case:
         planted=(),
         reference=row == "reference",
     )
-    if not what.entries or (what.coarse and index % 2 == 0):
+    if not what.entries or (what.half and index % 2 == 0):
         return replace(case, engine="project" if rng.random() < PROJECT_ENGINE_SHARE else "mujoco")
     gauge = Gauge(truth_of(case), trajectories_of(case)[0], friction_without_jitter(case), settling(robot))
     planted = _hide(case, gauge, rng)

@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +12,7 @@ from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.robot import Robot, load_robot
 from tests.benchmarks.hidden_effects.case import FloatArray
 
+FOLDER = Path(__file__).parent / "robots"
 BAXTER_ARM = tuple(f"left_{j}" for j in ("s0", "s1", "e0", "e1", "w0", "w1", "w2"))
 
 
@@ -46,6 +48,14 @@ ROBOTS = {
         "example:ur_description/urdf/ur5_robot.urdf",
         viscous=(6.0, 6.0, 4.0, 1.5, 1.5, 1.0),
         coulomb=(6.0, 7.0, 5.0, 1.5, 1.5, 1.0),
+    ),
+    # two joints; rigid and elastic joints by turns, about axes that are no axes of their links; two arms on one chest
+    "prosthesis": RobotSource(str(FOLDER / "prosthesis.urdf")),
+    "oblique_arm": RobotSource(
+        str(FOLDER / "oblique_arm.urdf"), viscous=(2.0, 0.0, 0.0, 0.3), coulomb=(2.5, 0.0, 0.0, 0.4)
+    ),
+    "torso": RobotSource(
+        str(FOLDER / "torso.urdf"), viscous=(4.0, 0.0, 0.0, 0.0, 0.0), coulomb=(4.0, 0.0, 0.0, 0.0, 0.0)
     ),
 }
 

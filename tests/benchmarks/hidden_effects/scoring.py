@@ -77,7 +77,9 @@ class Score:
         return joint_fits and name[0] in accepted
 
     def _is_last(self, joint: str | None) -> bool:
-        return joint == nominal_robot(self.case.robot).joint_names[-1]
+        robot = nominal_robot(self.case.robot)
+        # of its chain: of its neighbours none comes after it
+        return joint is not None and all(k < robot.index(joint) for k in robot.neighbours(robot.index(joint)))
 
     def finder(self, planted: Planted) -> Found | None:
         """The entry that names a planted effect."""
