@@ -18,6 +18,8 @@ from sea_ident.robot import Robot
 
 # A column that lies this close to the span of those kept before it (as a fraction of its length) adds nothing.
 _CLOSE = 1e-8
+# A column that is this much smaller than the largest one of its effect is rounding.
+_ROUNDING = 1e-13
 # Weights of a pivoted choice: first moments before moments of inertia before masses.
 _PREFERENCE = {"m": 0.25, "Ixx": 0.5, "Ixy": 0.5, "Iyy": 0.4, "Ixz": 0.5, "Iyz": 0.5}
 
@@ -216,13 +218,18 @@ def group_columns(columns: tuple[Column, ...], triangle: FloatArray, tolerance: 
 
 
 def _visible(columns: tuple[Column, ...], norms: FloatArray, tolerance: float) -> NDArray[np.bool_]:
-    """(p,) which columns are not zero but for rounding, judged among columns of one effect and unit."""
+    """(p,) which columns are not zero but for rounding, judged among columns of one effect and unit.
+
+    Where all of a unit are rounding, the other units of the effect tell: masses and inertias are a few metres apart. Of
+    another effect they say nothing: a torque to the power of three is many decades above a torque.
+    """
     largest: dict[tuple[str, str], float] = {}
+    whole: dict[str, float] = {}
     for column, norm in zip(columns, norms, strict=True):
         key = (column.effect, column.unit)
         largest[key] = max(largest.get(key, 0.0), float(norm))
-    floor = 1e-13 * float(norms.max(initial=0.0))
-    limit = np.array([max(tolerance * largest[c.effect, c.unit], floor) for c in columns])
+        whole[column.effect] = max(whole.get(column.effect, 0.0), float(norm))
+    limit = np.array([max(tolerance * largest[c.effect, c.unit], _ROUNDING * whole[c.effect]) for c in columns])
     visible: NDArray[np.bool_] = (norms > limit) & (norms > 0.0)
     return visible
 

@@ -192,6 +192,28 @@ def test_columns_of_any_scale_are_grouped_exactly() -> None:
     assert not np.any(base.grouping[:, 4])
 
 
+def test_what_another_effect_is_measured_in_hides_nothing() -> None:
+    """A saturation is in 1/N2 m2: its column is a torque to the power of three, 1e13 beside the 1e-2 of friction."""
+    rng = np.random.default_rng(2)
+    matrix = rng.normal(size=(60, 3)) * [1.0, 1e-2, 1e13]
+    columns = (
+        column("a"),
+        Column("j.viscous_friction", "N m s/rad", "viscous_friction", "j", Side.MOTOR),
+        Column("j.torque_saturation", "1/(N m)^2", "torque_saturation", "j", Side.MOTOR),
+    )
+    base = group_columns(columns, matrix)
+    np.testing.assert_array_equal(base.independent, [0, 1, 2])
+    psi = np.array([2.0, -1.0, 1e-13])
+    np.testing.assert_allclose(matrix @ base.project(psi), matrix @ psi, rtol=1e-12)
+
+
+def test_what_is_rounding_in_all_of_a_unit_is_judged_by_the_rest_of_the_effect() -> None:
+    rng = np.random.default_rng(3)
+    matrix = np.column_stack([rng.normal(size=60), 1e-15 * rng.normal(size=60)])
+    base = group_columns((column("a"), column("b", "kg m")), matrix)
+    assert base.names == ("a",)
+
+
 def test_robot_without_gravity_at_rest_has_nothing_to_tell() -> None:
     robot = load("quanser_2dof")
     rest = np.zeros((10, 2))
