@@ -43,6 +43,7 @@ from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
 from sea_ident.estimation.scales import doubts_of_springs
+from sea_ident.estimation.torque_units import other_torque_units
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
@@ -118,7 +119,7 @@ def diagnose(
             return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
     whole = period_data(processed, robot)
     data, notes = check.cleaned(whole, recording)
-    wrong = check.wrong_columns(robot, model.effects, processed)
+    wrong = (*check.wrong_columns(robot, model.effects, processed), *other_torque_units(model, processed))
     notes = check.Findings((*notes.warnings, *wrong), fatal=notes.fatal or bool(wrong))
     notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
     temperature = check.temperatures(recording, data)
