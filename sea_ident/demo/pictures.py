@@ -80,10 +80,11 @@ def angles(processed: ProcessedRecording, planned: FourierSeries, path: Path) ->
     reference = planned.evaluate(motion.time)
     for i, name in enumerate(processed.joint_names):
         color = _JOINT_COLORS[i % len(_JOINT_COLORS)]
-        axes.plot(time, reference[:, i], color=_INK, lw=0.7)
-        axes.plot(time, motion.theta[:, i], color=color, lw=1.5, label=f"{name}, motor")
+        axes.plot(time, motion.theta[:, i], color=color, lw=1.8, label=f"{name}, motor")
         axes.plot(time, motion.q[:, i], color=color, lw=1.3, ls=(0, (4, 2)), label=f"{name}, link")
-    axes.plot([], [], color=_INK, lw=0.7, label="planned")
+        # the motors follow so closely that it would be hidden beneath theirs
+        axes.plot(time, reference[:, i], color=_INK, lw=0.9, ls=":")
+    axes.plot([], [], color=_INK, lw=0.9, ls=":", label="planned")
     axes.set(xlabel="time [s]", ylabel="angle [rad]", title="Planned, motor and link angles")
     axes.legend(frameon=False, ncol=4, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     axes.margins(x=0)
