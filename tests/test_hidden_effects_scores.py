@@ -16,6 +16,7 @@ from tests.benchmarks.hidden_effects.diagnose_case import without_effects
 from tests.benchmarks.hidden_effects.draw import draw_case
 from tests.benchmarks.hidden_effects.generate import case_folder, generate, truth_file
 from tests.benchmarks.hidden_effects.scoring import Score, score_case
+from tests.benchmarks.hidden_effects.sizes import size_errors
 from tests.benchmarks.hidden_effects.table import EASILY_TAKEN_FOR, either_way, lines_of, wilson, write_report
 
 RIPPLE = Planted("torque_ripple", "knee", "library", 0.1, {"order": 5.0, "phase": 0.3}, gap=0.02, torque_share=0.02)
@@ -171,3 +172,21 @@ def test_what_is_like_another_is_so_either_way() -> None:
     assert "torque_ripple" in clusters["torque_offset"]
     assert {"backlash", "asymmetric_spring", "base_tilt"} <= clusters["spring_offset"]
     assert "link_friction" not in clusters["position_delay"]
+
+
+def test_sizes_are_compared_in_standard_deviations_of_the_diagnosis() -> None:
+    def entry(**told: tuple[float, float]) -> dict:
+        return {"parameters": [{"name": f"knee.{name}", "value": v, "std": s} for name, (v, s) in told.items()]}
+
+    ripple = entry(torque_ripple_sine=(0.1, 0.01), torque_ripple_cosine=(0.0, 0.01), torque_ripple_order=(5.0, 0.0))
+    expected = [(0.1 - 0.1 * np.cos(0.3)) / 0.01, -0.1 * np.sin(0.3) / 0.01]
+    assert size_errors(RIPPLE, ripple) == pytest.approx(expected)  # the order was held
+    assert size_errors(replace(RIPPLE, form="lugre"), ripple) == []
+    curve = replace(RIPPLE, effect="stribeck_friction", size=1.0, shape={"speed": 0.05, "exponent": 2.0})
+    told = entry(stribeck_friction=(1.1, 0.1), stribeck_friction_speed=(0.04, 0.01),
+                 stribeck_friction_exponent=(2.0, 0.5))  # fmt: skip
+    assert size_errors(curve, told) == pytest.approx([1.0, -1.0, 0.0])
+    late = replace(RIPPLE, effect="torque_delay", size=0.01, shape={})
+    assert size_errors(late, entry(torque_delay_delay=(-0.012, 0.001))) == pytest.approx([-2.0])
+    gain = replace(RIPPLE, effect="torque_constant", size=0.25, shape={})
+    assert size_errors(gain, entry(torque_constant=(-0.2, 0.01))) == pytest.approx([0.0])

@@ -10,6 +10,7 @@ from tests.benchmarks.hidden_effects.catalogue import ENTRIES
 from tests.benchmarks.hidden_effects.diagnose_case import RESULT
 from tests.benchmarks.hidden_effects.generate import case_folder
 from tests.benchmarks.hidden_effects.plants import nominal_robot
+from tests.benchmarks.hidden_effects.sizes import size_errors
 
 Name = tuple[str, str | None]
 
@@ -99,6 +100,17 @@ class Score:
         return tuple(
             f for f in self.found if not any(self.accepts(p, a) for p in self.case.planted for a in f.declared)
         )
+
+    def size_errors(self) -> list[float]:
+        """Errors of sizes of what is named rightly, in standard deviations of the diagnosis [-]."""
+        entries = self.record.get("missing", [])
+        return [
+            error
+            for planted in self.case.planted
+            for entry in entries
+            if (entry["effect"], entry.get("joint")) == planted.name
+            for error in size_errors(planted, entry)
+        ]
 
     @property
     def main(self) -> Planted:

@@ -135,6 +135,11 @@ def lines_of(scores: list[Score]) -> list[Line]:
                     lambda x: x >= 0.8))  # fmt: skip
         add(_number(row, "forward simulation of q, shrink, median", ">= 0.9", (s.shrink_simulation for s in right),
                     lambda x: x >= 0.9))  # fmt: skip
+    for row in ("one", "one_small", "two", "main_small", "coarse", "others"):
+        errors = [abs(error) for s in by_row[row] for error in s.size_errors()]
+        add(_share(row, "sizes within two standard deviations of the truth", ">= 95 %", (e < 2.0 for e in errors),
+                   lambda x: x >= 0.95))  # fmt: skip
+        add(_number(row, "errors of sizes in standard deviations, median", "<= 0.8", errors, lambda x: x <= 0.8))
     for robot, limit in LONGEST.items():
         timed = [s for s in scores if s.case.robot == robot and math.isfinite(s.seconds)]
         _seconds(robot, limit, [s.seconds for s in timed], add)
