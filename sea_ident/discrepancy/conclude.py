@@ -298,7 +298,7 @@ def _missing(
         columns = fit.columns[begin : begin + counts[position]]
         seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
         parameters = [
-            MissingParameter(c.name, float(fit.values[begin + i]), fit.std(begin + i), c.unit)
+            MissingParameter(c.name, float(fit.values[begin + i]), fit.uncertainty(begin + i), c.unit)
             for i, c in enumerate(columns)
             if seen[i]
         ]
@@ -329,7 +329,7 @@ def _shape_parameters(bench: Bench, fit: Fit, position: int) -> list[MissingPara
         std = 0.0
         for k, (owner, free) in enumerate(fit.free_shapes):
             if owner == position and free.name == shape.name:
-                step = fit.std(len(fit.columns) + k)
+                step = fit.uncertainty(len(fit.columns) + k)
                 std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
         out.append(
             MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))

@@ -36,7 +36,10 @@ def as_known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
 
 
 def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
-    """(N, E) standard deviation of the torque of an effect over a period, from that of its parameters and shapes."""
+    """(N, E) standard deviation of the torque of an effect over a period, from that of its parameters and shapes.
+
+    Larger in proportion where the model leaves more than noise.
+    """
     effect, count = fit.effects[position], len(fit.columns)
     start = sum(bench.counts(fit.effects)[:position])
     width = len(effect.columns(bench.robot))
@@ -51,4 +54,5 @@ def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
     if not directions:
         return np.zeros((bench.data.samples, len(bench.data.equations)))
     rows = waveform(np.concatenate(directions, axis=2), bench.data.samples)
-    return np.asarray(np.linalg.norm(rows @ np.concatenate(factors), axis=2), dtype=np.float64)
+    larger = np.sqrt(fit.unit)
+    return np.asarray(larger * np.linalg.norm(rows @ np.concatenate(factors), axis=2), dtype=np.float64)

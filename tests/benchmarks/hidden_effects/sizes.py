@@ -40,7 +40,8 @@ def size_errors(planted: Planted, entry: Mapping[str, Any]) -> list[float]:
     if planted.form != "library":
         return []
     prefix = f"{planted.joint}.{planted.effect}"
-    told = {p["name"].removeprefix(prefix).removeprefix("_"): (p["value"], p["std"]) for p in entry["parameters"]}
+    parameters = entry.get("parameters", ())
+    told = {p["name"].removeprefix(prefix).removeprefix("_"): (p["value"], p["std"]) for p in parameters}
     truth = dict(zip(SIZES.get(planted.effect, ()), (planted.size, *planted.shape.values()), strict=False))
     if planted.effect in WAVES:
         phase = planted.shape["phase"]
