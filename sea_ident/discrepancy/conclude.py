@@ -19,27 +19,24 @@ from sea_ident.discrepancy.findings import (
     LackOfFit,
     Location,
     MissingEffect,
-    MissingParameter,
     Verdict,
     Waveforms,
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of, noise_of_residual, torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut
-from sea_ident.discrepancy.judge import own_torque
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
+from sea_ident.discrepancy.named import named_effects, named_trend
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
-from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.standing import longest_standing
 from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
-from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
 from sea_ident.effects.orders import motors_too_fast
-from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.state import State
 
 FEWEST_PERIODS = 10
@@ -102,7 +99,7 @@ def conclude(
     statistic, dof, p_value = lack_of_fit(confirmed.bench, confirmed.start)
     left, left_dof, left_p = lack_of_fit(confirmed.bench, confirmed.final)
     remainder = remainder_share(confirmed.bench, confirmed.final) if left_p < LACK_LEVEL else 0.0
-    missing = [*_missing(bench, selection, alternatives, held), *(_missing_trend(bench, t) for t in trends.trends)]
+    missing = [*named_effects(bench, selection, alternatives, held), *(named_trend(bench, t) for t in trends.trends)]
     # what drifts differs from its first value in the mean too
     drifting = {(t.effect.name, t.effect.joint) for t in trends.trends}
     missing = [m for m in missing if (f"{m.effect}_drift", m.joint) not in drifting]
@@ -277,92 +274,6 @@ def _known_better(missing: list[MissingEffect], nameless: tuple[Unnamed, ...]) -
     known = {(each.effect, each.joint) for each in nameless if each.share <= LEAVES}
     weak = {(m.effect, m.joint) for m in missing if m.transfer is not None and m.transfer <= TRANSFERS}
     return bool(known) and weak <= known
-
-
-def _missing(
-    bench: Bench,
-    selection: Selection,
-    alternatives: dict[int, tuple[Alternative, ...]],
-    held: HeldOut | None,
-) -> list[MissingEffect]:
-    fit = selection.final.fit
-    first = len(fit.effects) - selection.added
-    counts = bench.counts(fit.effects)
-    out = []
-    nameless = resting(selection, held)
-    for k, position in enumerate(range(first, len(fit.effects))):
-        if k in nameless:
-            continue
-        effect = fit.effects[position]
-        begin = sum(counts[:position])
-        columns = fit.columns[begin : begin + counts[position]]
-        seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
-        parameters = [
-            MissingParameter(c.name, float(fit.values[begin + i]), fit.uncertainty(begin + i), c.unit)
-            for i, c in enumerate(columns)
-            if seen[i]
-        ]
-        parameters.extend(_shape_parameters(bench, fit, position))
-        transfer = held.transfers[k] if held is not None and held.transfers else None
-        out.append(
-            MissingEffect(
-                effect=effect.name,
-                joint=effect.joint,
-                parameters=tuple(parameters),
-                torque_share=own_torque(bench, fit, position),
-                p_value=selection.p_values[k],
-                alternatives=tuple(replace(each, fit=None) for each in alternatives.get(position, ())),
-                transfer=None if transfer is None or not transfer.tested else transfer.share,
-                detail=effect,
-                values=tuple(float(v) for v in fit.values[begin : begin + counts[position]]),
-            )
-        )
-    return out
-
-
-def _shape_parameters(bench: Bench, fit: Fit, position: int) -> list[MissingParameter]:
-    effect = fit.effects[position]
-    shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
-    out = []
-    for shape in shapes:
-        value = float(getattr(effect, shape.name))
-        std = 0.0
-        for k, (owner, free) in enumerate(fit.free_shapes):
-            if owner == position and free.name == shape.name:
-                step = fit.uncertainty(len(fit.columns) + k)
-                std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
-        out.append(
-            MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
-        )
-    return out
-
-
-def _missing_trend(bench: Bench, trend: Trend) -> MissingEffect:
-    effect = trend.effect
-    parameters = [
-        MissingParameter(c.name, float(v), float(s), c.unit)
-        for c, v, s in zip(effect.columns(bench.robot), trend.values, trend.stds, strict=True)
-    ]
-    parameters.extend(
-        MissingParameter(
-            effect.parameter_name(s.name),
-            float(getattr(effect, s.name)),
-            trend.time_constant_std if s.name == "time_constant" else 0.0,
-            s.unit,
-        )
-        for s in effect.shapes
-    )
-    others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
-    return MissingEffect(
-        effect=effect.name,
-        joint=effect.joint,
-        parameters=tuple(parameters),
-        torque_share=trend.torque_change,
-        p_value=trend.p_value,
-        alternatives=others,
-        detail=effect,
-        values=tuple(float(v) for v in trend.values),
-    )
 
 
 def _per_joint(bench: Bench, settled: Settled) -> dict[str, dict[str, float]]:

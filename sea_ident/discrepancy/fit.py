@@ -138,13 +138,6 @@ class Fit:
         """Standard deviation of a parameter (index < p) or a shape (p + position in `free_shapes`)."""
         return float(np.linalg.norm(self.covariance_factor[index]))
 
-    def uncertainty(self, index: int) -> float:
-        """Standard deviation as it is told: what the model leaves beyond noise makes it larger in proportion.
-
-        The ratio of Birge, The calculation of errors by the method of least squares, Physical Review 40, 1932.
-        """
-        return float(np.sqrt(self.unit)) * self.std(index)
-
     def lost_by(self, rows: slice | IntArray, values: FloatArray) -> float:
         """By how much the statistic grows, to second order, where parameters are off by values (k,): v' C^-1 v."""
         factor = self.covariance_factor[rows]

@@ -1,0 +1,112 @@
+"""Effects that a search or a test of trends found, with the numbers that are told of them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.judge import own_torque
+from sea_ident.discrepancy.resting import resting
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.trend import Trend
+from sea_ident.discrepancy.uncertainty import uncertainties
+from sea_ident.effects.signal import SignalEffect
+
+
+def named_effects(
+    bench: Bench,
+    selection: Selection,
+    alternatives: dict[int, tuple[Alternative, ...]],
+    held: HeldOut | None,
+) -> list[MissingEffect]:
+    """What was added by a search, with the numbers that are told of it.
+
+    Args:
+        bench: the recording.
+        selection: what was found.
+        alternatives: what else it may be, by the position among the effects.
+        held: how it did on data that was not used.
+    """
+    fit, stds = selection.final.fit, uncertainties(bench, selection.final)
+    first = len(fit.effects) - selection.added
+    counts = bench.counts(fit.effects)
+    out = []
+    nameless = resting(selection, held)
+    for k, position in enumerate(range(first, len(fit.effects))):
+        if k in nameless:
+            continue
+        effect = fit.effects[position]
+        begin = sum(counts[:position])
+        columns = fit.columns[begin : begin + counts[position]]
+        seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
+        parameters = [
+            MissingParameter(c.name, float(fit.values[begin + i]), float(stds[begin + i]), c.unit)
+            for i, c in enumerate(columns)
+            if seen[i]
+        ]
+        parameters.extend(_shape_parameters(bench, fit, position, stds))
+        transfer = held.transfers[k] if held is not None and held.transfers else None
+        out.append(
+            MissingEffect(
+                effect=effect.name,
+                joint=effect.joint,
+                parameters=tuple(parameters),
+                torque_share=own_torque(bench, fit, position),
+                p_value=selection.p_values[k],
+                alternatives=tuple(replace(each, fit=None) for each in alternatives.get(position, ())),
+                transfer=None if transfer is None or not transfer.tested else transfer.share,
+                detail=effect,
+                values=tuple(float(v) for v in fit.values[begin : begin + counts[position]]),
+            )
+        )
+    return out
+
+
+def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray) -> list[MissingParameter]:
+    effect = fit.effects[position]
+    shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
+    out = []
+    for shape in shapes:
+        value = float(getattr(effect, shape.name))
+        std = 0.0
+        for k, (owner, free) in enumerate(fit.free_shapes):
+            if owner == position and free.name == shape.name:
+                step = float(stds[len(fit.columns) + k])
+                std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
+        out.append(
+            MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
+        )
+    return out
+
+
+def named_trend(bench: Bench, trend: Trend) -> MissingEffect:
+    """What changes over a recording, with the numbers that are told of it."""
+    effect = trend.effect
+    parameters = [
+        MissingParameter(c.name, float(v), float(s), c.unit)
+        for c, v, s in zip(effect.columns(bench.robot), trend.values, trend.stds, strict=True)
+    ]
+    parameters.extend(
+        MissingParameter(
+            effect.parameter_name(s.name),
+            float(getattr(effect, s.name)),
+            trend.time_constant_std if s.name == "time_constant" else 0.0,
+            s.unit,
+        )
+        for s in effect.shapes
+    )
+    others = tuple(Alternative(e.name, e.joint, share) for e, share in trend.alternatives)
+    return MissingEffect(
+        effect=effect.name,
+        joint=effect.joint,
+        parameters=tuple(parameters),
+        torque_share=trend.torque_change,
+        p_value=trend.p_value,
+        alternatives=others,
+        detail=effect,
+        values=tuple(float(v) for v in trend.values),
+    )
