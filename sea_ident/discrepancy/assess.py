@@ -301,7 +301,8 @@ def _beside_reversals(
 
 def _shapes(bench: Bench, effect: Effect) -> tuple[tuple[str, float, str], ...]:
     """Name, value and unit of the shapes of an effect."""
-    return tuple((s.name, float(getattr(effect, s.name)), effect.shape_unit(s, bench.robot)) for s in effect.shapes)
+    shapes = () if isinstance(effect, SignalEffect) else effect.ranges
+    return tuple((s.name, float(getattr(effect, s.name)), effect.shape_unit(s, bench.robot)) for s in shapes)
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:

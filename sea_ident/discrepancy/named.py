@@ -14,7 +14,6 @@ from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.uncertainty import uncertainties
-from sea_ident.effects.signal import SignalEffect
 
 
 def named_effects(
@@ -68,9 +67,8 @@ def named_effects(
 
 def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray) -> list[MissingParameter]:
     effect = fit.effects[position]
-    shapes = effect.amounts if isinstance(effect, SignalEffect) else effect.shapes
     out = []
-    for shape in shapes:
+    for shape in effect.ranges:
         value = float(getattr(effect, shape.name))
         std = 0.0
         for k, (owner, free) in enumerate(fit.free_shapes):

@@ -259,7 +259,7 @@ def _missing(bench: StretchBench, fit: Fit, found: list[_Found], added: int) -> 
                 effect.parameter_name(shape.name), float(getattr(effect, shape.name)), 0.0,
                 effect.shape_unit(shape, bench.robot),
             )
-            for shape in (*effect.shapes, *getattr(effect, "amounts", ()))
+            for shape in effect.ranges
         )  # fmt: skip
         out.append(
             MissingEffect(

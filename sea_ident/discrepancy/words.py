@@ -199,6 +199,7 @@ def reservations(facts: Facts) -> list[str]:
             "the temperature goes the way that a drift goes by itself: whether friction follows it or the time is not "
             "told. Record the same once more while it goes another way, as in cooling down"
         )
+    found.extend(m.detail.reservation for m in facts.missing if m.detail is not None and m.detail.reservation)
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")
     return found

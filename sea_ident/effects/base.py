@@ -232,10 +232,16 @@ class Effect(ABC):
         """
         return True
 
+    @property
+    def reservation(self) -> str | None:
+        """What its estimates hang on that the data do not tell, for people; by default nothing."""
+        return None
+
     def shape_unit(self, shape: Shape, robot: Robot) -> str:
-        """Unit of a shape parameter at this joint: m in place of rad where the joint slides."""
+        """Unit of a shape parameter at this joint: m in place of rad, kg in place of kg m2 where the joint slides."""
         if self.joint is not None and robot.joints[robot.index(self.joint)].prismatic:
-            return shape.unit.replace("(N m)", "N").replace("N m", "N").replace("rad", "m")
+            unit = shape.unit.replace("(N m)", "N").replace("N m", "N").replace("rad", "m")
+            return unit.replace("kg m2", "kg")
         return shape.unit
 
     def parameter_name(self, label: str | None = None) -> str:

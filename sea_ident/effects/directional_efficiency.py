@@ -7,13 +7,13 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column
-from sea_ident.effects.load import MotorLoadEffect
+from sea_ident.effects.gear_loss import GearLoss
 from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class DirectionalEfficiency(MotorLoadEffect):
+class DirectionalEfficiency(GearLoss):
     """c |tau| sgn(theta') where tau theta' > 0, at the motor."""
 
     name: ClassVar[str] = "directional_efficiency"

@@ -7,13 +7,13 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column
-from sea_ident.effects.load import MotorLoadEffect
+from sea_ident.effects.gear_loss import GearLoss
 from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class LoadDependentFriction(MotorLoadEffect):
+class LoadDependentFriction(GearLoss):
     """c |tau| sgn(theta') at the motor, tau being the torque that the joint carries."""
 
     name: ClassVar[str] = "load_dependent_friction"

@@ -24,6 +24,9 @@ from sea_ident.robot.rotor_columns import rotor_columns
 MOMENTS = 4
 """Of the ten inertial parameters of a body, mass and first moments come first: they alone have a weight."""
 
+POSTURES = 100
+"""Samples of a motion in which an inertia is looked at: it changes with the posture alone."""
+
 
 class Side(StrEnum):
     """Where an effect enters."""
@@ -80,7 +83,7 @@ class State:
     @cached_property
     def body_regressor(self) -> FloatArray:
         """(N, n, 10 b) link rows of the standard inertial parameters of the links; in motor rows they are not."""
-        return self._regressor(self.robot.model, self.motion.dq, self.motion.ddq)
+        return self._regressor(self.robot.model, self.motion.q, self.motion.dq, self.motion.ddq)
 
     def gravity_torque(self, gravity: FloatArray, inertial: FloatArray) -> FloatArray:
         """(N, n) torque that the links at rest with these standard inertial parameters (10 b,) need [N m].
@@ -95,12 +98,28 @@ class State:
                 out += gravity[axis] * (self._rows_of_gravity(axis) @ moments)
         return out
 
+    def inertia_at(self, joint: int, inertial: FloatArray) -> FloatArray:
+        """(M,) inertia that a joint has by links with these standard inertial parameters (10 b,), in some samples.
+
+        Args:
+            joint: its index.
+            inertial: (10 b,).
+
+        Returns:
+            Torque per acceleration of this joint alone [kg m2], [kg] of one that slides.
+        """
+        model, q = pin.Model(self.robot.model), self.motion.q[:: 1 + len(self.motion) // POSTURES]
+        model.gravity = pin.Motion.Zero()
+        push = np.zeros_like(q)
+        push[:, joint] = 1.0
+        return np.asarray(self._regressor(model, q, np.zeros_like(q), push)[:, joint] @ inertial, dtype=np.float64)
+
     def _rows_of_gravity(self, axis: int) -> FloatArray:
         """(N, n, 4 b) link rows of masses and first moments at rest, under gravity of 1 m/s2 along an axis."""
         if axis not in self._gravity:
             model, still = pin.Model(self.robot.model), np.zeros_like(self.motion.q)
             model.gravity = pin.Motion(np.eye(3)[axis], np.zeros(3))
-            rows = self._regressor(model, still, still)
+            rows = self._regressor(model, self.motion.q, still, still)
             self._gravity[axis] = rows.reshape(*rows.shape[:2], -1, 10)[..., :MOMENTS].reshape(*rows.shape[:2], -1)
         return self._gravity[axis]
 
@@ -109,16 +128,16 @@ class State:
         """`_rows_of_gravity` by axis, of those that were asked for."""
         return {}
 
-    def _regressor(self, model: pin.Model, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """(N, n, 10 b) link rows at these speeds and accelerations of the links (N, n)."""
-        robot, motion, data = self.robot, self.motion, model.createData()
+    def _regressor(self, model: pin.Model, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+        """(N, n, 10 b) link rows at these positions, speeds and accelerations of the links (N, n)."""
+        robot, data = self.robot, model.createData()
         rows = [robot.extended_model.joints[int(k)].idx_v for k in robot.body_indices]
         link_map = robot.link_map[rows]
-        x = np.ascontiguousarray(motion.q @ link_map.T + robot.offset[rows])
+        x = np.ascontiguousarray(q @ link_map.T + robot.offset[rows])
         v, a = np.ascontiguousarray(dq @ link_map.T), np.ascontiguousarray(ddq @ link_map.T)
-        out = np.empty((len(motion), model.nv, 10 * (model.njoints - 1)))
+        out = np.empty((len(q), model.nv, 10 * (model.njoints - 1)))
         compute = pin.computeJointTorqueRegressor
-        for k in range(len(motion)):
+        for k in range(len(q)):
             out[k] = compute(model, data, x[k], v[k], a[k])
         if link_map.shape[0] == link_map.shape[1] and np.array_equal(link_map, np.eye(robot.n)):
             return out
