@@ -173,7 +173,7 @@ class Bench(ParameterFits):
         unit = across[:, seen] / strength[seen]
         normal, gradient = unit.T @ unit, unit.T @ fit.whitened
         rooms = np.array([room(fit.effects[position], shape) for position, shape in shapes]).T[:, seen] * strength[seen]
-        follow = -fit.covariance_factor[: len(fit.values)] @ (fit.basis.T @ directions)
+        follow = -fit.step_factor[: len(fit.values)] @ (fit.basis.T @ directions)
 
         def stepped(level: int, held: Collection[int] = ()) -> Fit | None:
             """The fit after a step of the shapes of all effects that are not held."""

@@ -58,6 +58,8 @@ class Fit:
         free_shapes: (s,) which shapes are free: index of the effect, and the shape.
         frame: (p, r) what makes `flat` nearly orthonormal, where no shape is free and it is known.
         known: what is there beside the model; None where that is nothing.
+        followed: gives the part (M, p) of what parameters do that a step of a fit does not know: what effects are
+            anchored in they follow in the next step. None where there is none.
     """
 
     effects: tuple[Effect, ...]
@@ -71,6 +73,7 @@ class Fit:
     free_shapes: tuple[tuple[int, Shape], ...]
     frame: FloatArray | None = None
     known: Known | None = None
+    followed: Callable[[], FloatArray | None] = lambda: None
 
     @property
     def solution(self) -> Solution:
@@ -102,9 +105,19 @@ class Fit:
         return self._solved[0]
 
     @property
+    def step_factor(self) -> FloatArray:
+        """(p + s, r) what takes amounts along `basis` to those of parameters and shapes."""
+        return self._solved[1]
+
+    @cached_property
     def covariance_factor(self) -> FloatArray:
         """(p + s, r) factor whose square is the covariance of parameters and shapes."""
-        return self._solved[1]
+        followed = self.followed()
+        if followed is None:
+            return self._solved[1]
+        whole = self.flat.copy()
+        whole[:, : followed.shape[1]] += followed
+        return solve(whole, self.whitened)[2]
 
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray]:

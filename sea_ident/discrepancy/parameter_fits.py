@@ -198,8 +198,14 @@ class ParameterFits(Tangents):
                 spectra = np.concatenate([spectra, bent], axis=2)
             return flat, spectra
 
+        def followed() -> FloatArray | None:
+            change = self.followed(effects, columns, values)
+            return None if change is None else free.off(whiten(whitener, change * scale[:, None]))
+
         frame = None if shapes else frame
-        return Fit(effects, columns, values, residual, scale, whitened, free, linear, shapes, frame, given.known)
+        return Fit(
+            effects, columns, values, residual, scale, whitened, free, linear, shapes, frame, given.known, followed
+        )
 
     def _descend(self, given: "_Given", values: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """(p,) parameters after Gauss-Newton steps: the scale of a link equation follows its own stiffness.

@@ -133,6 +133,25 @@ class Tangents(Columns):
                 slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect), effects)[:, 0]
         return out, slopes
 
+    def followed(
+        self, effects: tuple[Effect, ...], columns: tuple[Column, ...], values: FloatArray
+    ) -> ComplexArray | None:
+        """(H + 1, E, p) change of what effects do with the bodies that they are anchored in; None where there is none.
+
+        An estimate is as unsure as what it is multiplied by.
+        """
+        begins, names = np.cumsum([0, *self.counts(effects)]), [column.name for column in columns]
+        out: ComplexArray | None = None
+        for effect, begin, end in zip(effects, begins, begins[1:], strict=False):
+            rows = effect.followed(self.state(effects), values[begin:end])
+            if rows is None or not set(self.robot.inertial_names) <= set(names):
+                continue
+            change = np.zeros((self.data.harmonics + 1, len(self.data.equations), len(names)), dtype=np.complex128)
+            own = [names.index(name) for name in self.robot.inertial_names]
+            change[:, :, own] = self._spectra(Contribution(rows, np.zeros_like(rows)), signal_effects(effects))
+            out = change if out is None else out + change
+        return out
+
     def links_of(self, effect: Effect) -> list[int]:
         """Link equations of the joint of an effect."""
         return [e for e in self.links if self.data.equations[e].joint == effect.joint]

@@ -218,6 +218,18 @@ class Effect(ABC):
         """The same effect, knowing what it needs of the rest of the model; by default it needs nothing."""
         return self
 
+    def followed(self, state: State, values: FloatArray) -> FloatArray | None:
+        """How its torque changes with the bodies of the model that it is anchored in, None where it does not.
+
+        Args:
+            state: robot and motion.
+            values: (k,) of its parameters.
+
+        Returns:
+            (N, n, 10 b) link rows, for the standard inertial parameters.
+        """
+        return None
+
     def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
         """A speed (N,) at whose reversal its torque jumps, with the index of the joint; None for joint and motor speed.
 
