@@ -114,6 +114,14 @@ class State:
         push[:, joint] = 1.0
         return np.asarray(self._regressor(model, q, np.zeros_like(q), push)[:, joint] @ inertial, dtype=np.float64)
 
+    def gravity_rows(self, gravity: FloatArray) -> FloatArray:
+        """(N, n, 10 b) link rows of the standard inertial parameters of links at rest, under gravity (3,) [m/s2]."""
+        rows = np.zeros((*self.motion.q.shape, len(self.robot.bodies), 10))
+        for axis in np.flatnonzero(gravity):
+            own = self._rows_of_gravity(int(axis))
+            rows[..., :MOMENTS] += gravity[axis] * own.reshape(*own.shape[:2], -1, MOMENTS)
+        return rows.reshape(*self.motion.q.shape, -1)
+
     def _rows_of_gravity(self, axis: int) -> FloatArray:
         """(N, n, 4 b) link rows of masses and first moments at rest, under gravity of 1 m/s2 along an axis."""
         if axis not in self._gravity:

@@ -1,14 +1,24 @@
 """Gravity of a base that does not stand level, small angle or not."""
 
+import json
+import warnings
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from sea_ident import load_robot
+from sea_ident import build_regressor, identify, load_robot
+from sea_ident.discrepancy import diagnose
 from sea_ident.effects import Anchor, State, base_effects, effect_from_dict, make_effect, spring_effects
-from sea_ident.effects.base_tilt import level_axes, with_gravity
+from sea_ident.effects.base_tilt import with_gravity
+from sea_ident.effects.unfelt_moments import level_axes
+from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion
+from sea_ident.recordings import Recording
 from sea_ident.regressor import inverse_dynamics, model_columns, prior_parameters
+from sea_ident.robot import robot_from_text
+
+PERIOD, TILT = 5.0, (0.02, 0.01)
 
 
 @pytest.mark.parametrize("name", ["exo_leg", "exo_leg_abduction", "hebi_x5"])
@@ -54,3 +64,114 @@ def test_an_axis_in_the_plane_of_a_robot_is_not_felt_however_the_plane_was_given
         assert sizes[1 - felt] == 0.0 or seen
         assert sizes[felt] == pytest.approx(np.linalg.norm(exact[:, :, felt]), rel=1e-3)
     assert sizes[1 - felt] > 0.0
+
+
+def upright(joints, off=0.0):
+    """A chain that turns about upright axes, with the centre of mass of its first link further out by a share."""
+    parts, at = ['<link name="base"/>'], "base"
+    for k in range(joints):
+        out = 0.18 * (1.0 + off * (k == 0))
+        parts.append(
+            f'<link name="l{k}"><inertial><origin xyz="{out} {0.1 * out} 0.02"/><mass value="{2.4 - k}"/>'
+            '<inertia ixx="0.01" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="j{k}" type="revolute"><parent link="{at}"/><child link="l{k}"/>'
+            f'<origin xyz="{0.4 if k else 0} 0 0"/><axis xyz="0 0 1"/>'
+            '<limit lower="-2" upper="2" velocity="8" effort="60"/></joint>'
+            f'<transmission name="t{k}" type="transmission_interface/SimpleTransmission"><joint name="j{k}"/>'
+            f'<actuator name="m{k}"><mechanicalReduction>80</mechanicalReduction><rotorInertia>4e-5</rotorInertia>'
+            "<viscousFriction>0.8</viscousFriction><coulombFriction>0.8</coulombFriction></actuator></transmission>"
+        )
+        at = f"l{k}"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return robot_from_text(f'<robot name="chain">{"".join(parts)}</robot>', "chain.urdf")
+
+
+def swinging(n, seed):
+    """A motion of n joints."""
+    a, b = np.random.default_rng(seed).normal(0.0, 0.3, (2, n, 4)) / np.arange(1, 5) ** 0.7
+    return FourierSeries(1.0 / PERIOD, 0.3 * np.ones(n), a, b)
+
+
+def recorded(robot, seed):
+    """Periods of a motion of a robot on a base that is tilted, with a little noise, and the torques that it takes."""
+    motion, periods, rng = swinging(robot.n, seed).sample(200.0), 12, np.random.default_rng(seed)
+    turned = make_effect("base_tilt").modified(robot, np.array(TILT))
+    effects = base_effects(robot)
+    torque = build_regressor(turned, effects, motion).sum @ np.nan_to_num(prior_parameters(robot, effects))
+    columns = {
+        f"{kind}_{joint}": np.tile(signal[:, i], periods) + size * rng.standard_normal(periods * len(motion))
+        for kind, signal, size in (("q", motion.q, 1e-6), ("tau_motor", torque, 0.02))
+        for i, joint in enumerate(robot.joint_names)
+    }
+    return Recording(np.arange(periods * len(motion)) / 200.0, columns, "chain")
+
+
+def diagnosed(joints, off):
+    true, given = upright(joints), upright(joints, off)
+    one, other = (recorded(true, seed) for seed in (1, 2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = diagnose(identify(given, one, period=PERIOD), one, holdout=other, period=PERIOD)
+    assert [effect.effect for effect in found.missing] == ["base_tilt"]
+    return found, {p.name.removeprefix("robot.base_tilt_"): p for p in found.missing[0].parameters}
+
+
+@pytest.mark.parametrize("off", [0.2, *(pytest.param(off, marks=pytest.mark.scenario) for off in (0.0, -0.3))])
+def test_a_tilt_is_found_whatever_the_description_says_of_what_is_not_felt_level(off):
+    """As sure as the first moments that are felt, of which the angle is the divisor."""
+    found, parameters = diagnosed(2, off)
+    for name, angle in zip(("first", "second"), TILT, strict=True):
+        assert abs(parameters[name].value - angle) < 2.0 * parameters[name].std
+        assert parameters[name].std < 0.2 * angle
+    assert [parameters[f"moment_{name}"].unit for name in ("first", "second")] == ["kg m", "kg m"]
+    assert not any("upright axes" in text for text in found.warnings)
+    assert found.holdout.shrink > 0.95
+    assert all(gap.shrink > 0.8 for gap in found.simulation_gap.values())
+
+
+def test_where_only_the_product_of_a_tilt_and_a_first_moment_is_felt_that_is_said():
+    found, parameters = diagnosed(1, 0.2)
+    assert list(parameters) == ["first", "second"]
+    # the lever is a fifth longer, and the angle as much smaller
+    assert parameters["first"].value * 1.2 == pytest.approx(TILT[0], rel=0.05)
+    assert any("upright axes" in text for text in found.warnings)
+
+
+def test_a_simulation_has_the_first_moments_that_a_tilt_was_found_with():
+    """However a model shares what is not felt level among its bodies."""
+    robot = upright(2, off=0.2)
+    motion = swinging(2, 1).sample(50.0)
+    free = make_effect("base_tilt").on(State(robot, motion))
+    assert [shape.name for shape in free.ranges] == ["moment_first", "moment_second"]
+    found = type(free)(**{**vars(free), "inertial": robot.inertial_parameters, "moment_first": -0.1})
+    assert effect_from_dict(json.loads(json.dumps(found.to_dict()))) == found
+    other = robot.inertial_parameters.reshape(-1, 10).copy()
+    moved = 0.3  # [kg], from the axis of the second link to the first one
+    other[1, 0] -= moved
+    other[0] += moved * pin.Inertia(1.0, np.array([0.4, 0.0, 0.0]), np.zeros((3, 3))).toDynamicParameters()
+    other[0, 1] += 0.05
+    model = robot.with_inertial_parameters(other.ravel(), robot.rotor_inertias())
+    there = found.modified(model, np.array([0.02, 0.01]))
+    right = robot.inertial_parameters.copy()
+    right[1] -= 0.1
+    expected = robot.with_inertial_parameters(right, robot.rotor_inertias())
+    expected = with_gravity(expected, np.asarray(there.model.gravity.linear))
+    np.testing.assert_allclose(inverse_dynamics(there, motion)[0], inverse_dynamics(expected, motion)[0], atol=1e-9)
+
+
+def test_a_tilt_follows_the_bodies_that_are_felt():
+    """Those that are not are parameters of its own, or the description's."""
+    robot, angles = upright(2), np.array([0.02, -0.01])
+    motion = swinging(2, 1).sample(50.0)
+    state, plain = State(robot, motion), make_effect("base_tilt")
+    rows = plain.followed(state, angles)
+    own = {name: rows[:, :, k] for k, name in enumerate(robot.inertial_names)}
+    for name in ("l1.mx", "l1.my"):
+        more = robot.inertial_parameters.copy()
+        more[robot.inertial_names.index(name)] += 1.0
+        change = type(plain)(inertial=more).evaluate(state).link - plain.evaluate(state).link
+        # the second joint is where nothing but this is felt
+        np.testing.assert_allclose(own[name][:, 1], (change @ angles)[:, 1], atol=1e-3 * np.abs(change @ angles).max())
+    for name in ("l0.mx", "l0.my", "l1.m"):
+        assert not np.any(own[name])
