@@ -6,10 +6,10 @@ import pytest
 
 from sea_ident.discrepancy.assess import rivals
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.conclude import _shape_parameters
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import simplest_first
 from sea_ident.discrepancy.described import begin_as_described, from_described_springs
+from sea_ident.discrepancy.named import named_effects
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle
@@ -94,8 +94,8 @@ def test_large_errors_of_encoders_are_found_at_every_joint(laboratory, effect, s
     searched = search(bench, bench.effects)
     found, _ = simplest_first(bench, searched, rivals(bench, searched))
     assert [(e.name, e.joint) for e in found.effects] == [(effect, joint)]
-    fit = found.final.fit
-    values = {p.name: p for p in _shape_parameters(bench, fit, len(fit.effects) - 1)}
+    (told,) = named_effects(bench, found, {}, None)
+    values = {p.name: p for p in told.parameters}
     assert len(values) == len(shape)
     for name, value in shape.items():
         own = values[f"{joint}.{effect}_{name}"]
