@@ -23,9 +23,10 @@ def uncertainties(bench: Bench, now: Settled) -> FloatArray:
         bench: the recording.
         now: the model.
     """
-    fit, factor = now.fit, now.fit.covariance_factor
-    stds = np.linalg.norm(factor, axis=1)
-    steps = flat_steps(bench, now)
+    fit, steps = now.fit, flat_steps(bench, now)
+    stds = np.linalg.norm(fit.covariance_factor, axis=1)
     if len(steps) >= FEWEST_STEPS:
-        stds = np.maximum(stds, np.sqrt(np.mean((steps @ fit.basis @ factor.T) ** 2, axis=0)))
+        scatter = np.sqrt(np.mean((steps @ fit.basis @ fit.step_factor.T) ** 2, axis=0))
+        noise = np.linalg.norm(fit.step_factor, axis=1)
+        stds *= np.maximum(np.divide(scatter, noise, out=np.ones_like(noise), where=noise > 0.0), 1.0)
     return np.asarray(np.sqrt(fit.unit) * stds, dtype=np.float64)
