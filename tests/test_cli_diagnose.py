@@ -42,7 +42,7 @@ def test_the_next_experiment_is_an_excitation_like_any_other(told, tmp_path):
     [
         (Verdict.NAMED, "it is for an ambiguous pair, and the verdict is named"),
         (Verdict.NONE, "it is for an ambiguous pair, and the verdict is none"),
-        (Verdict.AMBIGUOUS, "no motion was found that tells the effects apart better"),
+        (Verdict.AMBIGUOUS, "no motion was tried, for there is no repaired model (the diagnosis says why)"),
     ],
 )
 def test_without_a_next_experiment_none_is_written_and_that_is_said(told, tmp_path, verdict, reason):
@@ -54,6 +54,12 @@ def test_without_a_next_experiment_none_is_written_and_that_is_said(told, tmp_pa
     assert out.endswith("written: d.json\n")
 
 
+def test_where_no_motion_tells_a_pair_apart_that_is_said(told):
+    found = Diagnosis(Verdict.AMBIGUOUS, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {}), model=SimpleNamespace())
+    reason = "there is no motion that tells the effects apart better (the diagnosis says why)"
+    assert f"warning: next.json is not written: {reason}" in told(found).stderr
+
+
 def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path):
     """Else what an earlier diagnosis proposed passes for what this one does."""
     (tmp_path / "next.json").write_text("before")
@@ -61,4 +67,4 @@ def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path):
     assert (tmp_path / "next.json").read_text() == "before"
     older, model = (line for line in answer.stderr.splitlines()[::-1])
     assert older.endswith("; the file of that name is an older one")
-    assert model == "warning: m.json is not written: the verdict named comes without a repaired model"
+    assert model == "warning: m.json is not written: there is no repaired model, and the verdict is named"

@@ -116,7 +116,8 @@ def close_gap(
     """Add the missing effects to a model, one diagnosis after the other.
 
     Stops when a diagnosis names nothing (nothing is missing, not in the library, ambiguous, suspect), nothing that the
-    model does not hold already, or nothing that a model can hold (what drifts), and after `rounds`.
+    model does not hold already, or nothing that a model can hold (what drifts), where no repaired model can be
+    identified, and after `rounds`.
 
     Args:
         model: the model.
@@ -150,12 +151,15 @@ def close_gap(
         history.append(diagnosis)
         notes.extend(text for text in diagnosis.warnings if text not in notes)
         found = {m.title for m in diagnosis.missing}
-        if diagnosis.verdict not in NAMED or diagnosis.model is None or found <= known:
+        if diagnosis.verdict not in NAMED or found <= known:
+            break
+        names = ", ".join(sorted(found))
+        if diagnosis.model is None:
+            notes.append(f"{names}: named, but not added, for there is no repaired model")
             break
         known |= found
         model = diagnosis.model
         if not found & {effect.title for effect in (*model.effects, *model.spring_effects)}:
-            names = ", ".join(sorted(found))
             notes.append(f"{names}: named, but a model of one moment has no place for what changes in the recording")
             break
     else:

@@ -22,13 +22,12 @@ from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.drifting import drifting
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference, identified_like
-from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.repaired import repair, with_repaired
 from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
 from sea_ident.discrepancy.search import Selection, search, still_needed, without
@@ -50,7 +49,7 @@ from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
-from sea_ident.side_by_side import follows, shared, side_by_side
+from sea_ident.side_by_side import follows, shared
 from sea_ident.simulation import Controller
 
 Progress = Callable[[str, float], None]
@@ -150,19 +149,19 @@ def diagnose(
     as_identified = _as_identified(recording, processed, robot)
     change, change_notes = _against(reference, as_identified, bench.data)
     tell("simulating", 0.85)
-    fits = [(as_identified, selection.final.fit), *([(processed, selection.start.fit)] if selection.added else [])]
-    repaired, *others = side_by_side(lambda given: repaired_model(model, *given), fits)
-    forward = _forward(others[0] if others else None, repaired, held, recording, processed, controller)
+    after = (as_identified, selection.final.fit)
+    before = (processed, selection.start.fit) if selection.added else None
+    repaired = repair(model, after, before, held, recording, processed, controller)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
     of_springs = (*doubts_of_springs(robot, model.springs), *circular_springs(robot, recording))
     of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
     basic_notes = (*of_sensors, *of_springs, *(() if basic is None else basic.warnings))
-    said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *forward.notes)
+    said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *repaired.notes)
     notes = replace(notes, warnings=said, limited=limited)
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
-        diagnosis = replace(diagnosis, model=repaired, simulation_gap=forward.gaps)
+        diagnosis = with_repaired(diagnosis, repaired)
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
@@ -357,24 +356,6 @@ def _against(
         return compare_with_reference(identified_like(reference, data.robot, processed), reference, data), ()
     except SeaIdentError as error:
         return None, (f"not compared with the reference, whose effects this recording does not determine: {error}",)
-
-
-def _forward(
-    before: Model | None,
-    repaired: Model | None,
-    held: HeldOut | None,
-    recording: Recording | ProcessedRecording,
-    processed: ProcessedRecording,
-    controller: Controller | None,
-) -> SimulationGap:
-    """Forward simulation before and after, on another motion where there is one; nothing where nothing was added."""
-    if before is None or repaired is None:
-        return SimulationGap({}, ())
-    if held is not None and held.processed is not None and held.recording is not None:
-        return simulation_gap(before, repaired, held.recording, held.processed, controller)
-    found = simulation_gap(before, repaired, recording, processed, controller)
-    same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
-    return replace(found, notes=(*same, *found.notes))
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:

@@ -294,8 +294,14 @@ def with_next_experiment(
 ) -> Diagnosis:
     """An ambiguous diagnosis with the experiment that would tell, and what to do in its text."""
     pairs = ambiguous_pairs(selection, alternatives)
-    if not pairs or diagnosis.model is None:
-        return diagnosis
+    if not pairs:
+        unlike = ", ".join(m.title for m in diagnosis.missing if m.alternatives)
+        why = f"no next experiment was designed for {unlike}: one is for what the mean of the periods shows"
+        return replace(diagnosis, warnings=(*diagnosis.warnings, why))
+    if diagnosis.model is None:
+        own, other = pairs[0].names
+        why = f"no next experiment was designed for {own} against {other}: there is no repaired model"
+        return replace(diagnosis, warnings=(*diagnosis.warnings, why))
     found, notes = propose(bench, selection.final.noise, pairs, diagnosis.model)
     first, second = pairs[0].names if found is None else found.separates
     if found is None:

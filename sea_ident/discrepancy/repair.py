@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.untold import BesideFit, in_base, widened
 from sea_ident.effects import Effect, Side, spring_effects
 from sea_ident.estimation import Model
-from sea_ident.estimation.identify import identify_observed, with_values
+from sea_ident.estimation.identify import default_estimator, identify_observed, with_values
 from sea_ident.estimation.knowledge import regular_covariance
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
@@ -22,13 +23,13 @@ BLIND = 5.0
 """Times the standard deviation in the fit beyond which that of the model says that it does not see a parameter [-]."""
 
 
-def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Model | None:
-    """The model identified anew with the effects that were found; None where that is not possible.
+def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Model | str:
+    """The model identified anew with the effects that were found.
 
     `identify` weighs the sum of both equations of a joint sample by sample, without those beside a reversal. What a
-    link equation tells, without any noise of torque, and what a friction does that falls within these samples is in
-    the fit of the diagnosis: both are put together, weighted by their covariances. A shape that the recording leaves
-    open stays as the model had it.
+    link equation tells, without any noise of torque, and what a friction does that falls within these samples is in the
+    fit of the diagnosis: both are put together, weighted by their covariances. What the sum does not tell at all is
+    that of the fit. A shape that the recording leaves open stays as the model had it.
 
     Args:
         model: the model that was diagnosed.
@@ -36,7 +37,7 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
         fit: the fit with the effects.
 
     Returns:
-        A model like any other.
+        A model like any other; why there is none, where that is not possible.
     """
     law = set(spring_effects(model.robot))
     known = (*model.effects, *model.spring_effects)
@@ -46,10 +47,14 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
     try:
         with python_warnings.catch_warnings():
             python_warnings.simplefilter("ignore", SeaIdentWarning)
-            found, observations, _ = identify_observed(model.robot, processed, effects)
-            return with_what_it_misses(found, observations, fit)
-    except SeaIdentError:
-        return None
+            how = default_estimator(processed)
+            # one stretch may be so long that its equations are never there at once
+            beside = BesideFit(how, fit) if processed.periods > 1 else how
+            found, observations, _ = identify_observed(model.robot, processed, effects, beside)
+            own = found if beside is how else widened(replace(found, estimator=how.name), observations, fit)
+            return with_what_it_misses(own, observations, fit)
+    except SeaIdentError as error:
+        return str(error)
 
 
 def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -77,12 +82,10 @@ def with_what_it_misses(model: Model, observations: Observations, fit: Fit) -> M
     Returns:
         The model; as it is where the fit tells nothing more.
     """
-    base, columns = model.base, [column.name for column in fit.columns]
-    names = [column.name for column in base.columns]
-    if not set(names) <= set(columns):
+    base, known = model.base, in_base(fit, model.base)
+    if known is None:
         return model
-    rows = [columns.index(name) for name in names]
-    factor = base.grouping @ fit.covariance_factor[rows]
+    there, factor = known
     own = regular_covariance(model)
     blind = np.sqrt(np.diag(own)) > BLIND * np.linalg.norm(factor, axis=1)
     linked = model.robot.elastic_indices.size > 0
@@ -92,7 +95,7 @@ def with_what_it_misses(model: Model, observations: Observations, fit: Fit) -> M
         return model
     other = factor[told] @ factor[told].T
     gain = own[:, told] @ np.linalg.inv(own[np.ix_(told, told)] + other)
-    values = model.values + gain @ ((base.grouping @ fit.values[rows])[told] - model.values[told])
+    values = model.values + gain @ (there[told] - model.values[told])
     left = np.eye(len(values))
     left[:, told] -= gain
     covariance = left @ own @ left.T + gain @ other @ gain.T

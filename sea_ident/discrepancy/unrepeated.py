@@ -36,6 +36,7 @@ from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.repaired import no_model
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
 from sea_ident.effects import Effect, make_effect, spring_effects
@@ -157,6 +158,8 @@ def diagnose_unrepeated(
         "motion ten times or more"
     )
     repaired = None if pushes else repaired_model(model, processed, now.fit)
+    if isinstance(repaired, str):
+        notes.append(no_model(repaired))
     diagnosis = Diagnosis(
         verdict=verdict,
         text=_text(robot, verdict, missing, gap, pushes, found),
@@ -172,7 +175,7 @@ def diagnose_unrepeated(
         training=gap,
         detectability=assess.detectability(bench, now.fit, now.noise, _candidates(bench, now), (bench, now)),
         warnings=tuple(dict.fromkeys(notes)),
-        model=repaired,
+        model=None if isinstance(repaired, str) else repaired,
         recording=processed.source,
         units=torque_units(robot),
     )  # fmt: skip

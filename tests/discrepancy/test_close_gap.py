@@ -142,3 +142,16 @@ def test_a_second_one_of_a_kind_at_a_joint_is_added_too(models, recordings, monk
     assert closed.verdict == "none"
     assert [e.title for e in closed.model.effects][-2:] == ["torque_ripple at hip", "torque_ripple 2 at hip"]
     assert not closed.warnings
+
+
+@pytest.mark.scenario
+def test_what_is_named_and_cannot_be_added_is_said(models, recordings, monkeypatch):
+    missing = (MissingEffect("link_friction", "knee", (), 0.1, 1e-9, ()),)
+    found = Diagnosis(Verdict.NAMED, "", NOTHING_LACKS, missing=missing, warnings=("there is no repaired model: why",))
+    monkeypatch.setattr(close, "diagnose", lambda *_, **__: found)
+    closed = sea_ident.close_gap(models[0], recordings[0])
+    assert closed.model is models[0]
+    assert closed.warnings == (
+        "there is no repaired model: why",
+        "link_friction at knee: named, but not added, for there is no repaired model",
+    )

@@ -2,14 +2,16 @@
 
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy import Diagnosis, LackOfFit, Verdict, next_experiment
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.next_experiment import _data_of, _identified
+from sea_ident.discrepancy.findings import Alternative, MissingEffect
+from sea_ident.discrepancy.next_experiment import _data_of, _identified, with_next_experiment
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
@@ -69,3 +71,22 @@ def test_what_belongs_to_the_periods_of_the_recording_is_not_in_the_proposed_mot
     np.testing.assert_array_equal(proposed.target(proposed.tau_motor), 0.0)
     assert len(proposed.starts) == proposed.periods == 0
     assert np.all(np.isfinite(Bench(proposed, laboratory.effects).design(laboratory.effects)))
+
+
+@pytest.mark.parametrize(
+    ("pairs", "why"),
+    [
+        (
+            [SimpleNamespace(names=("a at knee", "b at knee"))],
+            "a at knee against b at knee: there is no repaired model",
+        ),
+        ([], "friction_drift at knee: one is for what the mean of the periods shows"),
+    ],
+)
+def test_where_none_is_designed_the_reason_is_said(monkeypatch, pairs, why):
+    monkeypatch.setattr(next_experiment, "ambiguous_pairs", lambda *_: pairs)
+    others = (Alternative("temperature_friction", "knee", 1.0),)
+    missing = (MissingEffect("friction_drift", "knee", (), 0.1, 1e-9, others),)
+    found = Diagnosis(Verdict.AMBIGUOUS, "", LackOfFit(0.0, 1, 1.0, 1.0, {}), missing=missing)
+    told = with_next_experiment(found, None, None, {})
+    assert told.warnings == (f"no next experiment was designed for {why}",)

@@ -10,7 +10,7 @@ from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, Rec
 from sea_ident.cli.output import SHARES, by_share, check_targets, emit, note, progress
 
 if TYPE_CHECKING:
-    from sea_ident.discrepancy import Verdict
+    from sea_ident.discrepancy import Diagnosis
 
 
 def diagnose(
@@ -61,8 +61,8 @@ def diagnose(
     found.save(out)
     files = [
         str(out),
-        *_saved(model_out, found.model, f"the verdict {found.verdict} comes without a repaired model"),
-        *_saved(next_out, found.next_experiment, _no_next(found.verdict)),
+        *_saved(model_out, found.model, f"there is no repaired model, and the verdict is {found.verdict}"),
+        *_saved(next_out, found.next_experiment, _no_next(found)),
     ]
     if report is not None:
         from sea_ident.report import write_report
@@ -92,8 +92,10 @@ def _saved(target: Path | None, part: _Part | None, why_not: str) -> list[str]:
     return [str(target)]
 
 
-def _no_next(verdict: "Verdict") -> str:
+def _no_next(found: "Diagnosis") -> str:
     """Why there is no next experiment."""
-    if verdict == "ambiguous":
-        return "no motion was found that tells the effects apart better (the diagnosis says more)"
-    return f"it is for an ambiguous pair, and the verdict is {verdict}"
+    if found.verdict != "ambiguous":
+        return f"it is for an ambiguous pair, and the verdict is {found.verdict}"
+    if found.model is None:
+        return "no motion was tried, for there is no repaired model (the diagnosis says why)"
+    return "there is no motion that tells the effects apart better (the diagnosis says why)"

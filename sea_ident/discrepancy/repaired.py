@@ -1,0 +1,91 @@
+"""The repaired model beside the model as it was, in forward simulation, and what to know before it is used."""
+
+from dataclasses import dataclass, replace
+
+from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.findings import Gap
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
+from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.estimation import Model
+from sea_ident.processing import ProcessedRecording
+from sea_ident.recordings import Recording
+from sea_ident.side_by_side import side_by_side
+from sea_ident.simulation import Controller
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """A repaired model and what it does.
+
+    Attributes:
+        model: the model; None where none could be identified.
+        gaps: of forward simulation by signal, before and after.
+        notes: what a user should know, and why there is no model or no simulation.
+    """
+
+    model: Model | None
+    gaps: dict[str, Gap]
+    notes: tuple[str, ...]
+
+
+def repair(
+    model: Model,
+    after: tuple[ProcessedRecording, Fit],
+    before: tuple[ProcessedRecording, Fit] | None,
+    held: HeldOut | None,
+    recording: Recording | ProcessedRecording,
+    processed: ProcessedRecording,
+    controller: Controller | None,
+) -> Repaired:
+    """Repair a model, and simulate it before and after.
+
+    Args:
+        model: the model that was diagnosed.
+        after: the recording as it is identified from, and the fit with what was found.
+        before: the same without what was found; None where nothing was.
+        held: another motion, on which it is simulated where there is one.
+        recording: what was measured.
+        processed: the same, processed.
+        controller: what drove the motors.
+
+    Returns:
+        The model with what it does.
+    """
+    given = [after] if before is None else [after, before]
+    repaired, *former = side_by_side(lambda one: repaired_model(model, *one), given)
+    if isinstance(repaired, str):
+        return Repaired(None, {}, (no_model(repaired),))
+    if not former:
+        return Repaired(repaired, {}, ())
+    if isinstance(former[0], str):
+        return Repaired(repaired, {}, (f"no forward simulation, as the model before the repair is none: {former[0]}",))
+    forward = _forward(former[0], repaired, held, recording, processed, controller)
+    return Repaired(repaired, forward.gaps, forward.notes)
+
+
+def no_model(why: str) -> str:
+    """That the model was not repaired, and what follows."""
+    return f"there is no repaired model, thus neither forward simulation nor a next experiment: {why}"
+
+
+def _forward(
+    before: Model,
+    after: Model,
+    held: HeldOut | None,
+    recording: Recording | ProcessedRecording,
+    processed: ProcessedRecording,
+    controller: Controller | None,
+) -> SimulationGap:
+    """Forward simulation before and after, on another motion where there is one."""
+    if held is not None and held.processed is not None and held.recording is not None:
+        return simulation_gap(before, after, held.recording, held.processed, controller)
+    found = simulation_gap(before, after, recording, processed, controller)
+    same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
+    return replace(found, notes=(*same, *found.notes))
+
+
+def with_repaired(diagnosis: Diagnosis, repaired: Repaired) -> Diagnosis:
+    """A diagnosis with the repaired model."""
+    return replace(diagnosis, model=repaired.model, simulation_gap=repaired.gaps)
