@@ -10,7 +10,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.untold import BesideFit, in_base, widened
 from sea_ident.effects import Effect, Side, spring_effects
 from sea_ident.estimation import Model
-from sea_ident.estimation.identify import default_estimator, identify_observed, with_values
+from sea_ident.estimation.identify import default_estimator, doubted_anew, identify_observed, with_values
 from sea_ident.estimation.knowledge import regular_covariance
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
@@ -52,7 +52,7 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
             beside = BesideFit(how, fit) if processed.periods > 1 else how
             found, observations, _ = identify_observed(model.robot, processed, effects, beside)
             own = found if beside is how else widened(replace(found, estimator=how.name), observations, fit)
-            return with_what_it_misses(own, observations, fit)
+            return doubted_anew(with_what_it_misses(own, observations, fit), found)
     except SeaIdentError as error:
         return str(error)
 

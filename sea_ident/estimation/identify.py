@@ -332,6 +332,18 @@ def with_values(model: Model, observations: Observations, values: FloatArray) ->
     return replace(changed, springs=springs_from(observations, values, model.uncertainty, zeros, inside))
 
 
+def doubted_anew(model: Model, before: Model) -> Model:
+    """A model whose numbers were changed, without the doubts about those before, with what is to be doubted now.
+
+    Args:
+        model: the model.
+        before: as it was identified, with all of its warnings.
+    """
+    gone = set(_doubts(before))
+    kept = [text for text in model.warnings if text not in gone]
+    return replace(model, warnings=tuple(dict.fromkeys([*kept, *_doubts(model)])))
+
+
 def _refitted(model: Model, observations: Observations) -> Model:
     """The residuals of a model whose values were changed after the fit."""
     residual, scatter = observations.residual(model.values), observations.period_residuals(model.values)

@@ -103,6 +103,9 @@ def test_what_the_sum_of_both_equations_hides_comes_from_the_link_equations(labo
     for name, value in zip(("knee.link_friction_viscous", "knee.link_friction_coulomb"), effect.values, strict=True):
         assert abs(both[name].value - value) < 5.0 * both[name].std
         assert both[name].std < 0.05 * alone[name].std
+    # what the sum alone is doubted for is told by both
+    assert any("friction of motor and of link cannot be told apart" in text for text in from_sum.warnings)
+    assert not any("cannot be told apart" in text for text in repaired.warnings)
     coulomb = both["knee.coulomb_friction"]
     assert coulomb.value == pytest.approx(plant_from_robot(leg).coulomb_friction[1], rel=0.05)
     with warnings.catch_warnings():
