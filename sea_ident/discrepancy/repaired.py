@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
+import numpy as np
+
+from sea_ident.discrepancy.diagnosis import Diagnosis, units_by_joint
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
@@ -13,6 +15,9 @@ from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.side_by_side import side_by_side
 from sea_ident.simulation import Controller
+
+FAR_ABOVE = 3.0
+"""Times what the fit of a diagnosis leaves, noise and all, from which on what the model leaves is another thing [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,5 +92,46 @@ def _forward(
 
 
 def with_repaired(diagnosis: Diagnosis, repaired: Repaired) -> Diagnosis:
-    """A diagnosis with the repaired model."""
-    return replace(diagnosis, model=repaired.model, simulation_gap=repaired.gaps)
+    """A diagnosis with the repaired model, and with what speaks against that one."""
+    found = replace(diagnosis, model=repaired.model, simulation_gap=repaired.gaps)
+    return replace(found, warnings=(*found.warnings, *_worse_than_the_fit(found), *_worse_than_before(found)))
+
+
+def _worse_than_the_fit(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Where the repaired model leaves far more than the fit that it was made from."""
+    model, gap = diagnosis.model, diagnosis.training
+    if model is None or gap is None or model.fit.agreement is None:
+        return ()
+    own = model.fit.agreement
+    parts = []
+    for joint, left, noise in zip(model.robot.joints, own.gap, own.noise, strict=True):
+        fitted = gap.after[joint.name]
+        # the noise of a fit knows what steps of encoders do in every period, that of the model what none compares
+        if left > FAR_ABOVE * np.linalg.norm([fitted, gap.noise[joint.name], noise]):
+            parts.append(f"{left:.3g} {joint.torque_unit} at {joint.name} (the fit {fitted:.2g}, noise {noise:.2g})")
+    if not parts:
+        return ()
+    return (
+        f"the repaired model is far from what this diagnosis fitted: of the motor torque it leaves {', '.join(parts)} "
+        "beyond the noise. Do not rely on it, nor on its forward simulation",
+    )
+
+
+def _worse_than_before(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Where forward simulation is further from the recording with the repaired model than it was without."""
+    found = []
+    for kind, gap in diagnosis.simulation_gap.items():
+        units = units_by_joint(gap.units, gap.before, positions=kind != "tau")
+        parts = ", ".join(
+            f"{joint} {before:.2g} -> {gap.after[joint]:.2g} {units[joint]}"
+            for joint, before in gap.before.items()
+            if gap.after[joint] > np.hypot(before, gap.noise[joint])
+        )
+        if parts and gap.shrink < 0.0:
+            found.append(f"of {kind} by {-100.0 * gap.shrink:.0f} % ({parts})")
+    if not found:
+        return ()
+    return (
+        f"the gap in forward simulation grows with the repair: {'; '.join(found)}. What was found does not make the "
+        "model better there",
+    )

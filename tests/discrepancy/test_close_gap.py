@@ -155,3 +155,16 @@ def test_what_is_named_and_cannot_be_added_is_said(models, recordings, monkeypat
         "there is no repaired model: why",
         "link_friction at knee: named, but not added, for there is no repaired model",
     )
+
+
+@pytest.mark.scenario
+def test_what_speaks_against_a_repaired_model_is_said_where_nothing_is_missing_then(models, recordings, monkeypatch):
+    missing = (MissingEffect("torque_ripple", "hip", (), 0.1, 1e-9, ()),)
+    poor = Diagnosis(
+        Verdict.NAMED, "", NOTHING_LACKS, missing=missing, model=models[1], warnings=("the gap of q grows",)
+    )
+    rounds = iter([poor, Diagnosis(Verdict.NONE, "", NOTHING_LACKS, model=models[1])])
+    monkeypatch.setattr(close, "diagnose", lambda *_, **__: next(rounds))
+    closed = sea_ident.close_gap(models[0], recordings[0])
+    assert closed.verdict == "none"
+    assert "warning: the gap of q grows" in closed.summary()
