@@ -68,3 +68,14 @@ def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path):
     older, model = (line for line in answer.stderr.splitlines()[::-1])
     assert older.endswith("; the file of that name is an older one")
     assert model == "warning: m.json is not written: there is no repaired model, and the verdict is named"
+
+
+def test_a_report_takes_no_model_of_another_robot(monkeypatch, call_here, tmp_path):
+    units = {"hip": "N m", "knee": "N m"}
+    Diagnosis(Verdict.NONE, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {}), units=units).save(tmp_path / "d.json")
+    other = SimpleNamespace(robot=load_robot("quanser_2dof"))
+    monkeypatch.setattr("sea_ident.estimation.read_model", lambda path: other)
+    answer = call_here("report", "d.json", "--out", "r.html", "--model", "m.json", cwd=tmp_path)
+    assert answer.returncode == 2
+    assert "m.json: is a model of quanser_2dof (stage1, stage2), d.json is the diagnosis" in answer.stderr
+    assert not (tmp_path / "r.html").exists()

@@ -161,7 +161,7 @@ def read_result(path: Path, model: Path | None) -> "Model | Diagnosis":
 
     Raises:
         ModelFileError: the file cannot be read, or holds neither.
-        SeaIdentError: a model is given for a model.
+        SeaIdentError: a model is given for a model, or one of another robot.
     """
     from sea_ident.discrepancy import read_diagnosis
     from sea_ident.estimation import read_model
@@ -178,4 +178,13 @@ def read_result(path: Path, model: Path | None) -> "Model | Diagnosis":
             raise SeaIdentError(f"{path}: is no diagnosis; --model goes with a diagnosis only")
         return read_model(path)
     diagnosis = read_diagnosis(path)
-    return diagnosis if model is None else replace(diagnosis, model=read_model(model))
+    if model is None:
+        return diagnosis
+    repaired = read_model(model)
+    joints = tuple(diagnosis.units or diagnosis.lack_of_fit.per_joint)
+    if joints and joints != repaired.robot.joint_names:
+        raise SeaIdentError(
+            f"{model}: is a model of {repaired.robot.name} ({', '.join(repaired.robot.joint_names)}), {path} is the "
+            f"diagnosis of a robot with {', '.join(joints)}; give its repaired model"
+        )
+    return replace(diagnosis, model=repaired)
