@@ -1,5 +1,6 @@
 """What `sea-ident diagnose` writes beside the diagnosis."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -68,6 +69,16 @@ def test_a_file_that_stays_is_said_to_be_an_older_one(told, tmp_path):
     older, model = (line for line in answer.stderr.splitlines()[::-1])
     assert older.endswith("; the file of that name is an older one")
     assert model == "warning: m.json is not written: there is no repaired model, and the verdict is named"
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder that takes no file whoever writes")
+@pytest.mark.parametrize("option", ["--out", "--next", "--model-out", "--report"])
+def test_what_cannot_be_written_is_refused_before_anything_is_read(call_here, tmp_path, option):
+    outputs = {"--out": "d.json", option: "/proc/x.json"}
+    words = ["diagnose", "model.json", "rec.csv", *(word for pair in outputs.items() for word in pair)]
+    answer = call_here(*words, cwd=tmp_path)
+    assert answer.returncode == 2
+    assert "/proc/x.json: the folder /proc cannot be written to" in answer.stderr
 
 
 def test_a_report_takes_no_model_of_another_robot(monkeypatch, call_here, tmp_path):

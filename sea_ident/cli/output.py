@@ -2,12 +2,12 @@
 
 import json
 import math
-import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Protocol
 
 from sea_ident.exceptions import SeaIdentError
@@ -98,8 +98,12 @@ def check_targets(*targets: Path | None, inputs: Iterable[Path | str | None] = (
             raise SeaIdentError(f"{target}: is a folder; give the name of a file")
         if not folder.is_dir():
             raise SeaIdentError(f"{target}: the folder {folder} does not exist; make it first")
-        if not os.access(folder, os.W_OK):
-            raise SeaIdentError(f"{target}: the folder {folder} cannot be written to")
+        try:
+            # permissions do not tell: a superuser has them in a folder of the system that takes no file
+            with TemporaryFile(dir=folder):
+                pass
+        except OSError as error:
+            raise SeaIdentError(f"{target}: the folder {folder} cannot be written to ({error.strerror})") from None
         if target.resolve() in read:
             raise SeaIdentError(f"{target}: is read by this command and would be lost; name another file to write")
         if target.resolve() in seen:
