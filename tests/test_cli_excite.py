@@ -40,6 +40,21 @@ def test_everything_asked_for_is_there(written):
     assert sorted(p.name for p in (folder / "bag").iterdir()) == ["bag.db3", "metadata.yaml"]
 
 
+def test_where_springs_take_the_links(written, tmp_path):
+    """Told with the result, and kept inside where that is asked for."""
+    _, record = written
+    assert record["link_margins"]["hip_knee_sum"] < 0.0
+    assert any("hip_knee_sum by" in text and "--links-inside" in text for text in record["warnings"])
+    done = call("excite", "exo_leg", "--out", "e.json", *QUICK, "--links-inside", 0.05, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    inside = json.loads(done.stdout)
+    assert min(*inside["margins"].values(), *inside["link_margins"].values()) >= 0.0
+    assert inside["warnings"] == []
+    refused = call("excite", "exo_leg", "--out", "f.json", *QUICK, "--links-inside", 1, cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "the reserve of the limits is 1.0" in refused.stderr
+
+
 def test_csv_is_the_trajectory_in_full(written):
     folder, _ = written
     excitation = read_excitation(folder / "e.json")

@@ -3,6 +3,7 @@
 import time
 import warnings as python_warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from sea_ident.excitation.criteria import Criterion, DOptimality
 from sea_ident.excitation.defaults import default_limits
 from sea_ident.excitation.design_model import design_model, reduced_effects
 from sea_ident.excitation.limit_checks import as_numbers
+from sea_ident.excitation.links_inside import LinksInside, check_stiffness, look_at_links
 from sea_ident.excitation.problem import Problem
 from sea_ident.excitation.ramp import Ramp
 from sea_ident.excitation.result import Excitation
@@ -44,6 +46,7 @@ def design_excitation(
     effects: Sequence[Effect] | None = None,
     limits: Limits | None = None,
     motors: PredictedMotors | None = None,
+    links: LinksInside | None = None,
     rate: float = 200.0,
     information: FloatArray | None = None,
     noise: FloatArray | None = None,
@@ -66,6 +69,9 @@ def design_excitation(
         limits: limits of the motion; those of the robot by default.
         motors: how motor positions follow from those of the links; theta = q by default. With `PredictedMotors` the
             effects of springs can be among the effects; the rows of links and motors are then kept apart.
+        links: ask for links that stay inside the limits where their springs take them while the motors play the
+            trajectory. By default so only where the harmonics come near the frequencies at which the links swing;
+            elsewhere what they leave is in the warnings of the result.
         rate: samples per second of the observation matrix [Hz].
         information: (p, p) information about the base parameters of `effects` that is there already.
         noise: (n,) standard deviation of the torque noise of each joint [N m]; 1 by default. With `motors`, (2 n,) may
@@ -89,6 +95,8 @@ def design_excitation(
     samples = _check_sampling(base_frequency, harmonics, starts, rate)
     if effects is not None and not effects:
         raise ExcitationError("effects is empty; name those whose parameters are to be told, or leave it out")
+    if links is not None:
+        check_stiffness(robot)
     if jobs == 0:
         raise ExcitationError("jobs is 0; give at least 1, or -1 for one per core")
     notes: list[str] = []
@@ -119,11 +127,16 @@ def design_excitation(
         )
     if found.interrupted:
         notes.append("interrupted; this is the best so far")
+    there = look_at_links(problem, found.coefficients, links, notes)
     for note in notes[said:]:
         python_warnings.warn(note, SeaIdentWarning, stacklevel=3)
-    ramps = (None, None) if ramp is None else problem.ramps(found.coefficients, ramp)
+    # told with the result alone: a controller that moves the links along the trajectory keeps their limits
+    if there.beyond:
+        notes.append(there.beyond)
+    ramps = (None, None) if ramp is None else problem.ramps(there.coefficients, ramp)
     seconds = time.perf_counter() - begin
-    return problem.result(found.coefficients, ramps, starts, found.values, seed, seconds, tuple(notes))
+    result = problem.result(there.coefficients, ramps, starts, found.values, seed, seconds, tuple(notes))
+    return replace(result, margins={**result.margins, **there.kept}, link_margins=there.margins)
 
 
 def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,9 @@ class Excitation:
         parameters: (p,) names of the columns of F.
         samples: samples per period in F.
         margins: smallest distance to every limit over all t, in the unit of the limit; >= 0 is inside. That of torques,
-            deflections and distances between bodies is proven, so it is more in truth where it is large.
+            deflections and distances between bodies is proven, so it is more in truth where it is large. Links go where
+            motors go (theta = q), unless the design was made for links on springs: it then is that of whichever is
+            nearer, with torques of the motion on springs.
         limits: lower and upper value of every limit.
         starts: number of random starts that were climbed from.
         start_values: criterion that each start reached.
@@ -47,6 +49,8 @@ class Excitation:
         seconds: time that the design took [s].
         ramp_in: motion from rest into the periodic one, None where none was asked for.
         ramp_out: motion from the periodic one to rest.
+        link_margins: the same for links that follow on springs of the stiffness that the description gives, negative
+            where they leave a limit while the motors play the trajectory; empty where no stiffness is given.
         warnings: what a user should know.
     """
 
@@ -68,6 +72,7 @@ class Excitation:
     seconds: float
     ramp_in: RampMotion | None = None
     ramp_out: RampMotion | None = None
+    link_margins: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -106,7 +111,8 @@ class Excitation:
         lines = []
         for name in shown:
             lower, upper = self.limits[name]
-            proven = "" if name.rpartition(".")[2] in _EXACT else "at least "
+            exact = name.rpartition(".")[2] in _EXACT or self.link_margins.get(name) == self.margins[name]
+            proven = "" if exact else "at least "
             lines.append(f"  {name:<{width}}  [{lower:.5g}, {upper:.5g}]  margin {proven}{self.margins[name]:.3g}")
         if left_out:
             least = self.margins[left_out[0]]
@@ -133,6 +139,7 @@ class Excitation:
             "parameters": list(self.parameters),
             "samples": self.samples,
             "margins": self.margins,
+            "link_margins": self.link_margins,
             "limits": {name: [_finite(lower), _finite(upper)] for name, (lower, upper) in self.limits.items()},
             "starts": self.starts,
             "start_values": list(self.start_values),
@@ -202,6 +209,10 @@ def _from_record(record: Mapping[str, Any], path: str | Path) -> Excitation:
         raise ValueError(f"base_frequency is {frequency}")
     if set(record["limits"]) != set(record["margins"]):
         raise ValueError("limits and margins name different limits")
+    # files of earlier versions have none
+    link_margins = {str(name): float(value) for name, value in record.get("link_margins", {}).items()}
+    if not set(link_margins) <= set(record["limits"]):
+        raise ValueError("link_margins names limits that are not among the limits")
     return Excitation(
         series=FourierSeries(
             frequency,
@@ -229,5 +240,6 @@ def _from_record(record: Mapping[str, Any], path: str | Path) -> Excitation:
         seconds=float(record["seconds"]),
         ramp_in=None if record["ramp_in"] is None else RampMotion.from_dict(record["ramp_in"], n),
         ramp_out=None if record["ramp_out"] is None else RampMotion.from_dict(record["ramp_out"], n),
+        link_margins=link_margins,
         warnings=tuple(str(text) for text in record["warnings"]),
     )

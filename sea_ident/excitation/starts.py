@@ -164,7 +164,7 @@ class _Search:
         board.values = {start: problem.reported(point) for start, point in sorted(board.latest.items())}
         # the two best go on side by side, as the best may be stuck; few moves all go to the best
         ahead = sorted(order, key=lambda start: -board.values[start])[: 2 if count > _TOGETHER else 1]
-        judges = {start: _detailed(problem, board.latest[start]) for start in ahead}
+        judges = {start: detailed(problem, board.latest[start]) for start in ahead}
         moves = count + (_TOGETHER if count > _TOGETHER else 0)
         for first in range(0, moves, _TOGETHER):
             bases = [ahead[move % len(ahead)] for move in range(first, min(first + _TOGETHER, moves))]
@@ -238,7 +238,7 @@ def _scout(problem: Problem, board: Board, seed: int, given: FloatArray | None, 
 
 def _climb(problem: Problem, board: Board, start: int) -> None:
     """Climb until little is left to gain."""
-    information = _detailed(problem, board.latest[start])
+    information = detailed(problem, board.latest[start])
     criterion = problem.criterion
     _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, _COARSE * criterion.tolerance)
 
@@ -249,7 +249,7 @@ def _polish(problem: Problem, information: Information, board: Board, start: int
     _raise(problem, information, criterion, board, start, _POLISH_STEPS, 1e-5, criterion.tolerance)
 
 
-def _detailed(problem: Problem, point: FloatArray) -> Information:
+def detailed(problem: Problem, point: FloatArray) -> Information:
     """Information on so many samples that little is missed."""
     samples = min(problem.fine.sampling.samples, _CLIMB_SAMPLES * problem.harmonics)
     spacing = 1.0 / (problem.base_frequency * samples)

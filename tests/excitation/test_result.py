@@ -46,6 +46,17 @@ def test_round_trip(designed, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["excitation.json"]
 
 
+def test_files_of_earlier_versions_have_no_margins_of_links(designed, tmp_path):
+    record = designed.to_dict()
+    assert record["link_margins"]["hip.position"] == designed.link_margins["hip.position"]
+    del record["link_margins"]
+    (tmp_path / "old.json").write_text(json.dumps(record))
+    assert read_excitation(tmp_path / "old.json").link_margins == {}
+    (tmp_path / "other.json").write_text(json.dumps({**record, "link_margins": {"wing.position": 0.0}}))
+    with pytest.raises(ExcitationError, match="link_margins names limits that are not among the limits"):
+        read_excitation(tmp_path / "other.json")
+
+
 def test_without_ramps(designed, tmp_path):
     plain = replace(designed, ramp_in=None, ramp_out=None)
     plain.save(tmp_path / "plain.json")

@@ -43,6 +43,15 @@ def excite(
         float | None,
         typer.Option("--self-collision", metavar="M", help="Least distance between links that are not neighbours [m]."),
     ] = None,
+    links_inside: Annotated[
+        float | None,
+        typer.Option(
+            "--links-inside",
+            metavar="PART",
+            help="Keep the limits where the springs take the links too, and leave this part of each free. Default: "
+            "only where links would swing.",
+        ),
+    ] = None,
     ramp: Annotated[
         float | None,
         typer.Option(
@@ -73,7 +82,7 @@ def excite(
     as_json: AsJson = False,
 ) -> None:
     """Design an exciting trajectory inside the limits of a robot. Ctrl-C keeps the best so far."""
-    from sea_ident.excitation import Ramp, design_excitation
+    from sea_ident.excitation import LinksInside, Ramp, design_excitation
     from sea_ident.excitation.joint_trajectory import bag_types
 
     _check_targets(out, csv, yaml, bag, inputs=(robot, annotation))
@@ -97,6 +106,7 @@ def excite(
             starts=starts,
             seed=seed,
             limits=limits,
+            links=None if links_inside is None else LinksInside(links_inside),
             ramp=None if ramp is None else Ramp(ramp),
             jobs=jobs,
             progress=report,
