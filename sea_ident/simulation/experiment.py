@@ -16,6 +16,7 @@ from sea_ident.robot import Robot
 from sea_ident.simulation.controller import Controller, Drive, VelocityController
 from sea_ident.simulation.dynamics import ClosedLoop
 from sea_ident.simulation.elastic_inverse import link_position_at_rest
+from sea_ident.simulation.excess import broken_limits
 from sea_ident.simulation.friction import FrictionJitter, FrictionLaw, SmoothCoulomb
 from sea_ident.simulation.passes import Clock, Passes
 from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
@@ -191,7 +192,7 @@ def simulate(
         settled=settled,
         step=clock.step,
         steps=passes.steps,
-        warnings=(*warnings, *_overloads(robot, tau_motor)),
+        warnings=(*warnings, *broken_limits(robot, motion, tau_motor, settled=follow.period is not None)),
     )
 
 
@@ -246,13 +247,3 @@ def _sampled(reference: Motion, time: FloatArray, clock: Clock, stages: int) -> 
     rows = np.arange(len(time)) % clock.samples if len(time) > clock.samples + 1 else np.arange(len(time))
     names = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
     return replace(reference, time=time, **{name: getattr(reference, name)[rows * per_sample] for name in names})
-
-
-def _overloads(robot: Robot, tau_motor: FloatArray) -> list[str]:
-    """Motors that would have to deliver more than they can."""
-    peaks = np.max(np.abs(tau_motor), axis=0)
-    return [
-        f"joint {joint.name!r}: the motor reaches {peak:.4g} {joint.torque_unit}, its limit is {limit:.4g}"
-        for joint, peak, limit in zip(robot.joints, peaks, robot.limits.torque, strict=True)
-        if peak > limit
-    ]
