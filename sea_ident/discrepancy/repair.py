@@ -15,6 +15,7 @@ from sea_ident.estimation.knowledge import regular_covariance
 from sea_ident.estimation.observations import Observations
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
+from sea_ident.robot import Robot
 
 OPEN = 0.5
 """Standard deviation, in logarithms or in shares of its range, from which on a recording leaves a shape open [-]."""
@@ -45,16 +46,34 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
         effect for effect in with_open_shapes(fit, known) if effect.side is not Side.SPRING or effect not in law
     )
     try:
-        with python_warnings.catch_warnings():
-            python_warnings.simplefilter("ignore", SeaIdentWarning)
-            how = default_estimator(processed)
-            # one stretch may be so long that its equations are never there at once
-            beside = BesideFit(how, fit) if processed.periods > 1 else how
-            found, observations, _ = identify_observed(model.robot, processed, effects, beside)
-            own = found if beside is how else widened(replace(found, estimator=how.name), observations, fit)
-            return doubted_anew(with_what_it_misses(own, observations, fit), found)
+        return identified_beside(model.robot, processed, effects, fit)
     except SeaIdentError as error:
         return str(error)
+
+
+def identified_beside(robot: Robot, processed: ProcessedRecording, effects: Sequence[Effect], fit: Fit) -> Model:
+    """A model identified with what the motor torques do not tell from the fit of a diagnosis.
+
+    Args:
+        robot: the robot.
+        processed: the recording.
+        effects: as `identify` takes them.
+        fit: to link and motor equations of the same recording, with the same parameters.
+
+    Returns:
+        The model.
+
+    Raises:
+        IdentificationError: the recording does not determine it.
+    """
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        how = default_estimator(processed)
+        # one stretch may be so long that its equations are never there at once
+        beside = BesideFit(how, fit) if processed.periods > 1 else how
+        found, observations, _ = identify_observed(robot, processed, effects, beside)
+        own = found if beside is how else widened(replace(found, estimator=how.name), observations, fit)
+        return doubted_anew(with_what_it_misses(own, observations, fit), found)
 
 
 def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
