@@ -244,7 +244,13 @@ def _explain(change: _Change, patterns: list[_Pattern]) -> tuple[MissingEffect, 
             break
         chosen.append(best)
         left = rest
-    return tuple(_described(change, pattern, chosen, patterns) for pattern in chosen)
+    while True:
+        found = [_described(change, pattern, chosen, patterns) for pattern in chosen]
+        # beside others that came after it, one may explain nothing any more
+        worst = max(range(len(found)), key=lambda k: found[k].p_value, default=None)
+        if worst is None or found[worst].p_value <= LEVEL:
+            return tuple(found)
+        del chosen[worst]
 
 
 def _described(change: _Change, pattern: _Pattern, chosen: list[_Pattern], patterns: list[_Pattern]) -> MissingEffect:

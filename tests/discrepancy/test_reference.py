@@ -113,3 +113,10 @@ def test_all_torque_constants_have_the_share_of_torque_that_they_changed_by(reco
     change = found.missing[0].parameters[0]
     assert abs(change.value - 0.03) < 4.0 * change.std
     assert found.missing[0].torque_share == pytest.approx(0.03, rel=0.05)
+
+
+def test_what_others_explain_as_well_is_not_listed_beside_them(recorded, compared):
+    """A torque constant that both models lack looks like all of them, until what it does is found piece by piece."""
+    found = compared(recorded([("torque_constant", "hip", [-0.03], {})]), recorded(seed=11))
+    assert found.missing
+    assert max(m.p_value for m in found.missing) < LEVEL
