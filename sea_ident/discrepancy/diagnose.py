@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
+from sea_ident.discrepancy.against import against
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
@@ -16,7 +17,7 @@ from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude, unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
-from sea_ident.discrepancy.data import PeriodData, period_data, wide_processing
+from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.drifting import drifting
@@ -26,7 +27,6 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_experiment import with_next_experiment
-from sea_ident.discrepancy.reference import ParameterChange, compare_with_reference, identified_like
 from sea_ident.discrepancy.repaired import repair, with_repaired
 from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
@@ -43,7 +43,7 @@ from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
 from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.estimation.torque_units import other_torque_units
-from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.processing.doubt import DoubtKind, texts_of
@@ -147,7 +147,7 @@ def diagnose(
         away = (confirmed.bench, confirmed.final)
         nameless = (*unnamed(bench, selection, held, away), *stand_ins(bench, selection), *drifts)
     as_identified = _as_identified(recording, processed, robot)
-    change, change_notes = _against(reference, as_identified, bench.data)
+    change, change_notes = against(reference, bench, selection.final, as_identified)
     tell("simulating", 0.85)
     after = (as_identified, selection.final.fit)
     before = (processed, selection.start.fit) if selection.added else None
@@ -344,18 +344,6 @@ def _as_identified(
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         return process(recording, robot, period=processed.period)
-
-
-def _against(
-    reference: Model | None, processed: ProcessedRecording, data: PeriodData
-) -> tuple[ParameterChange | None, tuple[str, ...]]:
-    """How the parameters differ from those of an earlier model, and why that cannot be said where it cannot."""
-    if reference is None:
-        return None, ()
-    try:
-        return compare_with_reference(identified_like(reference, data.robot, processed), reference, data), ()
-    except SeaIdentError as error:
-        return None, (f"not compared with the reference, whose effects this recording does not determine: {error}",)
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:

@@ -1,6 +1,5 @@
 """What a refit absorbs, against an earlier model."""
 
-import warnings as python_warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +9,9 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter
 from sea_ident.effects import make_effect, spring_effects
-from sea_ident.estimation import Model, identify
+from sea_ident.estimation import Model
 from sea_ident.estimation.knowledge import regular_covariance
 from sea_ident.estimation.observations import base_rows
-from sea_ident.exceptions import SeaIdentWarning
-from sea_ident.processing import ProcessedRecording
-from sea_ident.robot import Robot
 from sea_ident.singular_values import svd
 
 LEVEL = 1e-3
@@ -68,30 +64,11 @@ class _Pattern:
     columns: FloatArray
 
 
-def identified_like(reference: Model, robot: Robot, processed: ProcessedRecording) -> Model:
-    """A model of a recording that was identified as the earlier one: what that lacks spoils both in the same way.
-
-    Args:
-        reference: the earlier model.
-        robot: the robot as it is known now.
-        processed: the recording.
-
-    Returns:
-        The model, with the effects of the earlier one, their shapes among them.
-
-    Raises:
-        IdentificationError: the recording does not determine it.
-    """
-    with python_warnings.catch_warnings():
-        python_warnings.simplefilter("ignore", SeaIdentWarning)
-        return identify(robot, processed, effects=(*reference.effects, *reference.spring_effects))
-
-
 def compare_with_reference(now: Model, reference: Model, data: PeriodData) -> ParameterChange:
     """Test the parameters against those of an earlier model, and find the pattern of the change.
 
     Args:
-        now: a model of the recording, with the effects of the earlier one (see `identified_like`).
+        now: a model of the recording, with the effects of the earlier one before any others (see `against`).
         reference: the earlier model.
         data: the recording.
 
@@ -149,8 +126,11 @@ class _Change:
 
 def _difference(now: Model, reference: Model, data: PeriodData) -> _Change:
     """Difference of two models in the parameters that both see."""
-    combined = np.linalg.lstsq(reference.base.grouping.T, now.base.grouping.T, rcond=None)[0].T
-    left = np.linalg.norm(now.base.grouping - combined @ reference.base.grouping, axis=1)
+    # what is new has no part in what the earlier model saw
+    grouping = np.zeros((reference.base.rank, len(now.base.columns)))
+    grouping[:, : len(reference.base.columns)] = reference.base.grouping
+    combined = np.linalg.lstsq(grouping.T, now.base.grouping.T, rcond=None)[0].T
+    left = np.linalg.norm(now.base.grouping - combined @ grouping, axis=1)
     both = np.flatnonzero(left <= SAME * np.linalg.norm(now.base.grouping, axis=1))
     combined = combined[both]
     before = combined @ reference.values

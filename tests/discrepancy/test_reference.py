@@ -9,10 +9,9 @@ import pytest
 from scipy import stats
 
 import sea_ident
-from sea_ident.discrepancy.reference import LEVEL, SMALLEST_CHANGE, compare_with_reference, identified_like
+from sea_ident.discrepancy.reference import LEVEL, SMALLEST_CHANGE, compare_with_reference
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.exceptions import SeaIdentWarning
-from sea_ident.processing import process
 from sea_ident.simulation import FrictionJitter, SensorNoise
 
 MASS = 1.5
@@ -39,8 +38,7 @@ def compared(laboratory, leg):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeaIdentWarning)
             reference = sea_ident.identify(leg, earlier, effects=effects, period=5.0)
-            processed = process(recording, leg, period=5.0)
-        now = identified_like(reference, leg, processed)
+            now = sea_ident.identify(leg, recording, effects=effects, period=5.0)
         return compare_with_reference(now, reference, laboratory.data(recording))
 
     return compare

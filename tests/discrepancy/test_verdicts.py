@@ -109,6 +109,13 @@ def test_only_against_the_reference(laboratory, leg, model):
     assert found.verdict is Verdict.ONLY_AGAINST_REFERENCE
 
 
+@pytest.mark.scenario
+def test_what_is_found_is_no_change_against_the_reference_too(laboratory, model):
+    offset = ("torque_offset", "hip", [1.0], {})
+    found = quietly(model, laboratory.record([offset], periods=10), reference=model)
+    assert [(m.effect, m.joint) for m in found.missing] == [offset[:2]]
+
+
 def test_a_reference_whose_effects_the_recording_cannot_show_is_not_compared_and_that_is_said(model, intact):
     warm = replace(model, effects=(*model.effects, make_effect("temperature_friction", "hip")))
     diagnosis = quietly(model, intact, reference=warm)
