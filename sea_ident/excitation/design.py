@@ -127,7 +127,7 @@ def design_excitation(
         )
     if found.interrupted:
         notes.append("interrupted; this is the best so far")
-    there = look_at_links(problem, found.coefficients, links, notes)
+    there = look_at_links(problem, found.coefficients, links, notes, hurry=found.interrupted)
     for note in notes[said:]:
         python_warnings.warn(note, SeaIdentWarning, stacklevel=3)
     # told with the result alone: a controller that moves the links along the trajectory keeps their limits

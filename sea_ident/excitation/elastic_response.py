@@ -19,8 +19,10 @@ from sea_ident.excitation.springs import SpringTorque
 from sea_ident.motion import FourierSeries, Motion, fourier_basis
 from sea_ident.robot import Robot
 
-# harmonics of the links for one of the motors: a cubic spring triples a frequency
+# harmonics of the links for one of the motors, as a cubic spring triples a frequency; at most so many more, as links do
+# not follow what is far above their resonance
 _TIMES = 3
+_MOST_MORE = 40
 # samples for one harmonic of the links: products of four of them do not alias into those that are balanced
 _SAMPLES = 4
 _ROUNDS = 15
@@ -163,7 +165,8 @@ def elastic_response(springs: Springs, motors: FourierSeries) -> ElasticResponse
     Returns:
         Motors and links, None if no such motion was found.
     """
-    balance = _Balance(springs, motors, _TIMES * motors.harmonics)
+    more = min((_TIMES - 1) * motors.harmonics, _MOST_MORE)
+    balance = _Balance(springs, motors, motors.harmonics + more)
     links = balance.solve(1.0, balance.start)
     if links is None:
         share, step, last = 0.0, 0.25, balance.start

@@ -90,6 +90,11 @@ def elastic_wall(limits: ElasticLimits, motors: FourierSeries, rest: FloatArray)
     )
 
 
+def wall_size(limits: ElasticLimits, motors: FourierSeries) -> int:
+    """Number of slopes of an `elastic_wall`, at most."""
+    return (len(limits.linear) + len(limits.dynamic)) * _POINTS * motors.harmonics * motors.coefficients.size
+
+
 def _values(limits: ElasticLimits, about: IntArray, response: ElasticResponse, time: FloatArray) -> FloatArray:
     """(r, M) limited values, torques without friction."""
     motion, linear = response.motion(time), limits.linear

@@ -9,7 +9,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.excitation.barrier import raise_inside
 from sea_ident.excitation.elastic_limits import ElasticLimits
-from sea_ident.excitation.elastic_wall import elastic_wall
+from sea_ident.excitation.elastic_wall import elastic_wall, wall_size
 from sea_ident.excitation.information import Information
 from sea_ident.excitation.problem import Problem
 from sea_ident.excitation.starts import detailed
@@ -17,6 +17,8 @@ from sea_ident.excitation.walls import DynamicWall
 
 _ROUNDS = 20
 _STEPS = 30
+# slopes of a wall, 400 MB
+_LARGEST = 5e7
 # gains, in units of the criterion's tolerance, that are not worth another round
 _SMALL = 20.0
 # of an ascent that leads outside: how much of it is tried, and how far that is shrunk toward rest
@@ -24,26 +26,31 @@ _PARTS = (1.0, 0.5, 0.25, 0.1, 0.04)
 _SHRUNK = (1.0, 0.99, 0.96, 0.9)
 # part of its range by which a limit is broken that so little shrinking does not mend
 _FAR = 0.1
-# factor by which the design for theta = q is shrunk in turn, and the smallest one that is tried
+# factors by which the design for theta = q is shrunk in turn, and the smallest one that is tried in all
 _SMALLER = 0.8
+_LEAST_PART = 0.3
 _SMALLEST = 1e-3
 
 
-def keep_links_inside(problem: Problem, limits: ElasticLimits, coefficients: FloatArray) -> FloatArray | None:
+def keep_links_inside(
+    problem: Problem, limits: ElasticLimits, coefficients: FloatArray, *, hurry: bool
+) -> FloatArray | None:
     """Turn a design for theta = q into one whose links are inside all limits.
 
     Args:
         problem: what was raised, inside what.
         limits: limits of the links.
         coefficients: (n, 2 L + 1) design, inside for theta = q.
+        hurry: whether shrinking it toward rest is to be enough. It is as well where the slopes of the limits would not
+            fit into memory.
 
     Returns:
-        (n, 2 L + 1) coefficients; None if no trajectory was found that is inside. If interrupted from the keyboard, the
-        best so far.
+        (n, 2 L + 1) coefficients, those of the design if its links are inside; None if no trajectory was found. If
+        interrupted from the keyboard, the best so far.
     """
     best = _shrunk(problem, limits, coefficients)
-    if best is None:
-        return None
+    if best is None or best is coefficients or hurry or wall_size(limits, problem.series(best)) > _LARGEST:
+        return best
     information = detailed(problem, best)
     value, small = problem.value(information, best), 0
     try:
@@ -72,12 +79,14 @@ def room(problem: Problem, limits: ElasticLimits, coefficients: FloatArray) -> f
 
 def _shrunk(problem: Problem, limits: ElasticLimits, coefficients: FloatArray) -> FloatArray | None:
     """A trajectory shrunk toward rest until it is inside."""
-    factor = 1.0
+    factor, trial = 1.0, coefficients
     while factor > _SMALLEST:
-        trial = problem.centre + factor * (coefficients - problem.centre)
-        if room(problem, limits, trial) >= 0.0:
+        left = room(problem, limits, trial)
+        if left >= 0.0:
             return trial
-        factor *= _SMALLER
+        # what moves about the middle of its range, in proportion, would just be inside
+        factor *= max(_LEAST_PART, min(_SMALLER, 0.5 / (0.5 - left)))
+        trial = problem.centre + factor * (coefficients - problem.centre)
     return None
 
 

@@ -8,7 +8,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import ExcitationError
 from sea_ident.excitation.elastic_limits import ElasticLimits
 from sea_ident.excitation.elastic_response import Springs
-from sea_ident.excitation.links_ascent import keep_links_inside, room
+from sea_ident.excitation.links_ascent import keep_links_inside
 from sea_ident.excitation.problem import Problem
 from sea_ident.robot import Robot
 
@@ -75,7 +75,7 @@ def check_stiffness(robot: Robot) -> None:
 
 
 def look_at_links(
-    problem: Problem, coefficients: FloatArray, wanted: LinksInside | None, notes: list[str]
+    problem: Problem, coefficients: FloatArray, wanted: LinksInside | None, notes: list[str], *, hurry: bool
 ) -> OnSprings:
     """Find out where links go on their springs, and keep them inside where that is asked for or they would swing.
 
@@ -84,6 +84,7 @@ def look_at_links(
         coefficients: (n, 2 L + 1) design, inside for theta = q.
         wanted: asks for links that are kept inside in any case.
         notes: a change of the design, or that none was found, is added here.
+        hurry: whether a change is to take as little time as it can.
     """
     springs = Springs.of(problem.robot, problem.model.springs)
     if not len(springs.joints):
@@ -95,15 +96,15 @@ def look_at_links(
     looked_after = wanted is not None or highest > NEAR * lowest
     if looked_after:
         inner = limits if wanted is None else limits.tightened(wanted.reserve)
-        if room(problem, inner, coefficients) < 0.0:
-            chosen = keep_links_inside(problem, inner, coefficients)
-            if chosen is not None and wanted is None:
-                notes.append(
-                    f"harmonics up to {highest:.4g} Hz come near the {lowest:.4g} Hz at which links swing on their "
-                    f"springs: the trajectory is one with which the links stay inside the limits, and tells less "
-                    f"({problem.reported(chosen):.4g} instead of {problem.reported(coefficients):.4g}); fewer "
-                    f"harmonics, or a lower base frequency, may tell more"
-                )
+        chosen = keep_links_inside(problem, inner, coefficients, hurry=hurry)
+        if chosen is not None and chosen is not coefficients and wanted is None:
+            notes.append(
+                f"harmonics up to {highest:.4g} Hz come near the {lowest:.4g} Hz at which links swing on their "
+                f"springs: the trajectory is one with which the links stay inside the limits, and tells less "
+                f"({problem.reported(chosen):.4g} instead of {problem.reported(coefficients):.4g}); fewer harmonics, or "
+                f"a lower base frequency, may tell more. What a controller misses makes them swing too: "
+                f"LinksInside(reserve=0.1) (--links-inside 0.1) leaves room for it"
+            )
     series = problem.series(coefficients if chosen is None else chosen)
     margins = limits.margins(series)
     if margins is None:

@@ -431,8 +431,10 @@ def test_very_many_harmonics_are_begun_at_once_and_can_be_interrupted(exo):
         warnings.simplefilter("always")
         found = design_excitation(exo, harmonics=170, starts=2, rate=50.0, jobs=1, progress=interrupt)
     texts = [str(warning.message) for warning in caught]
-    assert len(texts) == len(set(texts)) == len(found.warnings) == 2
+    assert len(texts) == len(set(texts)) == len(found.warnings) == 3
     assert "170 harmonics of 3 joints are 1023 coefficients, up to 17 Hz" in texts[0]
+    assert "interrupted" in texts[1]
+    assert "harmonics up to 17 Hz come near the" in texts[2]
     assert values == sorted(values)
     assert all(margin >= 0.0 for margin in found.margins.values())
     assert violations(exo, found.series, 20_000) <= 1e-9
