@@ -30,7 +30,7 @@ class LinksInside:
             those of the description, add [-].
     """
 
-    reserve: float = 0.0
+    reserve: float = 0.05
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.reserve < 1.0:
@@ -95,15 +95,15 @@ def look_at_links(
     chosen: FloatArray | None = coefficients
     looked_after = wanted is not None or highest > NEAR * lowest
     if looked_after:
-        inner = limits if wanted is None else limits.tightened(wanted.reserve)
+        inner = limits.tightened((wanted or LinksInside()).reserve)
         chosen = keep_links_inside(problem, inner, coefficients, hurry=hurry)
         if chosen is not None and chosen is not coefficients and wanted is None:
             notes.append(
                 f"harmonics up to {highest:.4g} Hz come near the {lowest:.4g} Hz at which links swing on their "
                 f"springs: the trajectory is one with which the links stay inside the limits, and tells less "
-                f"({problem.reported(chosen):.4g} instead of {problem.reported(coefficients):.4g}); fewer harmonics, or "
-                f"a lower base frequency, may tell more. What a controller misses makes them swing too: "
-                f"LinksInside(reserve=0.1) (--links-inside 0.1) leaves room for it"
+                f"({problem.reported(chosen):.4g} instead of {problem.reported(coefficients):.4g}); fewer harmonics or "
+                f"a lower base frequency may tell more. What a controller misses makes links swing too: a reserve "
+                f"above {LinksInside().reserve:g} (links=LinksInside(reserve=...), --links-inside) leaves room for it"
             )
     series = problem.series(coefficients if chosen is None else chosen)
     margins = limits.margins(series)
@@ -128,8 +128,8 @@ def look_at_links(
     beyond = _beyond(limits, margins, _UNTOLD)
     if beyond:
         beyond += (
-            "; links=LinksInside() (--links-inside 0) keeps them inside, and so does a controller that moves the links "
-            "themselves along the trajectory"
+            "; links=LinksInside() (--links-inside 0.05) keeps them inside, and so does a controller that moves the "
+            "links themselves along the trajectory"
         )
     return OnSprings(series.coefficients, told, {}, beyond)
 
