@@ -62,8 +62,14 @@ ROWS = {
         Row("other_form", "form differs from the library", 7, OTHER_FORMS),
         Row("weak", "weak excitation", 8, LIBRARY, weak=True),
         Row("coarse", "encoders of few bits, nothing or one effect", 10, LIBRARY, half=True, coarse=True),
-        Row("others", "other robots, nothing or one effect", 11, LIBRARY, half=True,
-            robots=("prosthesis", "oblique_arm", "torso")),
+        Row(
+            "others",
+            "other robots, nothing or one effect",
+            11,
+            LIBRARY,
+            half=True,
+            robots=("prosthesis", "oblique_arm", "torso"),
+        ),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }
