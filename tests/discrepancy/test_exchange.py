@@ -146,3 +146,32 @@ def test_a_push_takes_the_place_of_a_law_only_where_it_explains_nearly_all(wrong
     after = exchange(bench, now, 1, {})
     assert (after.fit.effects == pushed.effects) is taken
     assert (after is now) is not taken
+
+
+@pytest.fixture
+def matches(rippled, monkeypatch):
+    """Two effects that were added, and one other in the place of each, fitted as a pair at prices that are given."""
+    bench, start, _ = rippled
+
+    def found(*prices):
+        pair = [
+            module._Match(place, key(f"own {place}"), key(f"other {place}"), None, 0.9, 1.0, start.fit)
+            for place in range(2)
+        ]
+        outcomes = [module._Outcome(f"model {k}", 0.5, price, True) for k, price in enumerate(prices)]
+        monkeypatch.setattr(module, "_matches", lambda *given: (match for match in pair))
+        monkeypatch.setattr(module, "_price", lambda *given: 100.0)
+        monkeypatch.setattr(module, "side_by_side", lambda trial, items: (o for o in outcomes))
+        tried = {}
+        return module._first_better(bench, start, range(2), tried, ()), {own for own, _ in tried}
+
+    return found
+
+
+def test_of_a_pair_in_two_places_the_second_is_forgotten_where_the_first_took_its_own(matches):
+    assert matches(10.0, 1.0) == ((1, "model 0"), {key("own 0")})
+
+
+def test_of_a_pair_in_two_places_the_second_may_take_its_own(matches):
+    assert matches(200.0, 10.0) == ((2, "model 1"), {key("own 0"), key("own 1")})
+    assert matches(200.0, 200.0) == ((2, None), {key("own 0"), key("own 1")})
