@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import sea_ident
@@ -41,6 +42,17 @@ def found(recorded, joint, factor):
 @pytest.mark.parametrize("factor", [1.0, -1.0, 1.3, 2.0, 30.0])
 def test_what_is_no_unit_is_not_called_one(recorded, factor):
     assert found(recorded, "knee", factor) == ()
+
+
+def test_a_torque_of_another_course_is_no_unit(recorded):
+    """A thousand times that of the model, and far more that has nothing to do with it."""
+    leg, model, recording = recorded
+    other = scaled(recording, "knee", 1000.0).columns["current_knee"]
+    beside = 5.0 * np.std(other) * np.sin(2.0 * np.pi * 35.0 / PERIOD * recording.time)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        disturbed = replace(recording, columns={**recording.columns, "current_knee": other + beside})
+        assert other_torque_units(model, sea_ident.process(disturbed, leg, period=PERIOD)) == ()
 
 
 def test_thousandths_and_a_torque_before_the_gear_are_recognised(recorded):
