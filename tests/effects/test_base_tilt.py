@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pinocchio as pin
 import pytest
+from chains import rigid_chain
 
 from sea_ident import build_regressor, identify, load_robot
 from sea_ident.discrepancy import diagnose
@@ -16,7 +17,6 @@ from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.recordings import Recording
 from sea_ident.regressor import inverse_dynamics, model_columns, prior_parameters
-from sea_ident.robot import robot_from_text
 
 PERIOD, TILT = 5.0, (0.02, 0.01)
 
@@ -68,23 +68,16 @@ def test_an_axis_in_the_plane_of_a_robot_is_not_felt_however_the_plane_was_given
 
 def upright(joints, off=0.0):
     """A chain that turns about upright axes, with the centre of mass of its first link further out by a share."""
-    parts, at = ['<link name="base"/>'], "base"
-    for k in range(joints):
-        out = 0.18 * (1.0 + off * (k == 0))
-        parts.append(
-            f'<link name="l{k}"><inertial><origin xyz="{out} {0.1 * out} 0.02"/><mass value="{2.4 - k}"/>'
-            '<inertia ixx="0.01" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-            f'<joint name="j{k}" type="revolute"><parent link="{at}"/><child link="l{k}"/>'
-            f'<origin xyz="{0.4 if k else 0} 0 0"/><axis xyz="0 0 1"/>'
-            '<limit lower="-2" upper="2" velocity="8" effort="60"/></joint>'
-            f'<transmission name="t{k}" type="transmission_interface/SimpleTransmission"><joint name="j{k}"/>'
-            f'<actuator name="m{k}"><mechanicalReduction>80</mechanicalReduction><rotorInertia>4e-5</rotorInertia>'
-            "<viscousFriction>0.8</viscousFriction><coulombFriction>0.8</coulombFriction></actuator></transmission>"
-        )
-        at = f"l{k}"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeaIdentWarning)
-        return robot_from_text(f'<robot name="chain">{"".join(parts)}</robot>', "chain.urdf")
+    out = [0.18 * (1.0 + off * (k == 0)) for k in range(joints)]
+    return rigid_chain(
+        ["0 0 1"] * joints,
+        [f"{x} {0.1 * x} 0.02" for x in out],
+        [2.4 - k for k in range(joints)],
+        'ixx="0.01" iyy="0.03" izz="0.04"',
+        [f"{0.4 if k else 0} 0 0" for k in range(joints)],
+        "<mechanicalReduction>80</mechanicalReduction><rotorInertia>4e-5</rotorInertia>"
+        "<viscousFriction>0.8</viscousFriction><coulombFriction>0.8</coulombFriction>",
+    )
 
 
 def swinging(n, seed):

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from chains import rigid_chain
 
 from sea_ident import build_regressor, identify
 from sea_ident.discrepancy import diagnose
@@ -14,7 +15,6 @@ from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
 from sea_ident.recordings import Recording
 from sea_ident.regressor import model_columns, prior_parameters
-from sea_ident.robot import robot_from_text
 
 RATIO, ROTOR, PERIOD = 50.0, 8e-5, 5.0
 
@@ -24,22 +24,17 @@ UPRIGHT, LEVEL = "0 0 1", "0 -1 0"
 def built(axes, rotor=True, kind="revolute"):
     """A chain of rigid joints, with the inertia of the rotors in its description or not."""
     inertia = f"<rotorInertia>{ROTOR}</rotorInertia>" if rotor else ""
-    parts, at = ['<link name="base"/>'], "base"
-    for k, axis in enumerate(axes):
-        parts.append(
-            f'<link name="l{k}"><inertial><origin xyz="0.02 0.01 {-0.14 + 0.02 * k}"/><mass value="{2.0 - 0.7 * k}"/>'
-            '<inertia ixx="0.02" iyy="0.021" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-            f'<joint name="j{k}" type="{kind}"><parent link="{at}"/><child link="l{k}"/>'
-            f'<origin xyz="0 0 {-0.3 if k else 1}"/><axis xyz="{axis}"/>'
-            '<limit lower="-2" upper="2" velocity="8" effort="60"/></joint>'
-            f'<transmission name="t{k}" type="transmission_interface/SimpleTransmission"><joint name="j{k}"/>'
-            f'<actuator name="m{k}"><mechanicalReduction>{RATIO}</mechanicalReduction>{inertia}'
-            "<viscousFriction>0.4</viscousFriction><coulombFriction>0.4</coulombFriction></actuator></transmission>"
-        )
-        at = f"l{k}"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeaIdentWarning)
-        return robot_from_text(f'<robot name="chain">{"".join(parts)}</robot>', "chain.urdf")
+    count = range(len(axes))
+    return rigid_chain(
+        axes,
+        [f"0.02 0.01 {-0.14 + 0.02 * k}" for k in count],
+        [2.0 - 0.7 * k for k in count],
+        'ixx="0.02" iyy="0.021" izz="0.004"',
+        [f"0 0 {-0.3 if k else 1}" for k in count],
+        f"<mechanicalReduction>{RATIO}</mechanicalReduction>{inertia}"
+        "<viscousFriction>0.4</viscousFriction><coulombFriction>0.4</coulombFriction>",
+        kind,
+    )
 
 
 def moving(n, seed=1):
