@@ -50,9 +50,15 @@ def test_where_springs_take_the_links(written, tmp_path):
     inside = json.loads(done.stdout)
     assert min(*inside["margins"].values(), *inside["link_margins"].values()) >= 0.0
     assert inside["warnings"] == []
+    planned = call("excite", "exo_leg", "--out", "p.json", *QUICK, "--links-as-planned", "--json", cwd=tmp_path)
+    assert json.loads(planned.stdout)["a"] == record["a"]
+    assert json.loads(planned.stdout)["link_margins"] == {}
     refused = call("excite", "exo_leg", "--out", "f.json", *QUICK, "--links-inside", 1, cwd=tmp_path)
     assert refused.returncode == 2
     assert "the reserve of the limits is 1.0" in refused.stderr
+    both = call("excite", "exo_leg", "--out", "f.json", *QUICK, "--links-as-planned", "--links-inside", 0, cwd=tmp_path)
+    assert both.returncode == 2
+    assert "give one of them" in both.stderr
 
 
 def test_csv_is_the_trajectory_in_full(written):

@@ -8,7 +8,7 @@ of each in the noise of the recording, the worse of both counting.
 """
 
 import warnings as python_warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -28,7 +28,16 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.effects import Effect, Side
 from sea_ident.estimation import Model
 from sea_ident.exceptions import SeaIdentError
-from sea_ident.excitation import Criterion, Discrimination, DOptimality, Excitation, PredictedMotors, design_excitation
+from sea_ident.excitation import (
+    Criterion,
+    Discrimination,
+    DOptimality,
+    Excitation,
+    LinksAsPlanned,
+    LinksInside,
+    PredictedMotors,
+    design_excitation,
+)
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.robot import Robot
 from sea_ident.side_by_side import side_by_side
@@ -42,6 +51,9 @@ STARTS = 1
 
 SEEDS = (1, 2, 3, 4)
 """Of the random starts."""
+
+TOLERANCE_FACTOR = 100.0
+"""Gains too small to go on for, in units of the usual ones: what is told apart is told by far more."""
 
 SAMPLES_PER_HARMONIC = 5
 """Samples of a proposed motion, per harmonic that is compared."""
@@ -100,32 +112,26 @@ def propose(
         The experiment, None where no better motion was found, and warnings.
     """
     now = [separation(bench, noise, pair) for pair in pairs]
-    robot, motors = _identified(model)
-    best: tuple[float, list[float], Excitation] | None = None
-    reasons: list[str] = []
-    attempts = side_by_side(_Attempt(bench, noise, pairs, robot, motors), _plans(robot, pairs[0]))
-    for attempt in attempts:
-        if isinstance(attempt, str):
-            reasons.append(attempt)
-            continue
-        excitation, there = attempt
-        score = float(np.sum(np.log(np.maximum(there, 1.0))))
-        if best is None or score > best[0]:
-            best = (score, there, excitation)
-        if min(there) > PLENTY:
-            break
-    attempts.close()
     first, second = pairs[0].names
-    if best is None:
+    design = _Design(bench, noise, pairs, *_identified(model))
+    shown, reasons = _shown(design, _plans(model.robot, pairs[0]), lambda each: min(each.energies) > PLENTY)
+    if shown and model.robot.elastic_indices.size:
+        # to keep links inside where their springs take them takes longer than a design: the best alone, as long as it
+        # still tells what one of them did
+        shown.sort(key=lambda each: -each.score)
+        most = max(len(each.told(now)) for each in shown)
+        plans = [replace(each.plan, begun=each.excitation) for each in shown]
+        shown, reasons = _shown(design, plans, lambda each: len(each.told(now)) >= most)
+    if not shown:
         return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
-    _, there, excitation = best
-    gains = [float(np.sqrt(new / max(old, 1.0))) for new, old in zip(there, now, strict=True)]
-    told = [k for k in range(len(pairs)) if there[k] >= SMALLEST_ENERGY and gains[k] >= WORTHWHILE]
+    best = max(shown, key=lambda each: each.score)
+    told = best.told(now)
     untold = [pairs[k].names[1] for k in range(len(pairs)) if k not in told]
     notes = (f"of the motions that were tried inside the limits none tells {first} from {', '.join(untold)}",)
     if not told:
         return None, notes
-    return NextExperiment(pairs[told[0]].names, excitation.to_dict(), gains[told[0]]), notes if untold else ()
+    gain = best.gains(now)[told[0]]
+    return NextExperiment(pairs[told[0]].names, best.excitation.to_dict(), gain), notes if untold else ()
 
 
 def separation(bench: Bench, noise: NoiseFloor, pair: Pair) -> float:
@@ -165,12 +171,61 @@ class _Plan:
         effects: whose columns it is to show; all usual ones where None.
         springs: whether springs are among them.
         seed: of the starts.
+        begun: a design for links as planned, whose links are to be kept inside; None for a new one.
     """
 
     criterion: Criterion
     effects: tuple[Effect, ...] | None
     springs: bool
     seed: int
+    begun: Excitation | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What a motion shows of every pair.
+
+    Attributes:
+        plan: what it was designed for.
+        excitation: the motion.
+        energies: what every effect leaves of its rival, in units of the noise.
+    """
+
+    plan: _Plan
+    excitation: Excitation
+    energies: list[float]
+
+    @property
+    def score(self) -> float:
+        """Larger is better."""
+        return float(np.sum(np.log(np.maximum(self.energies, 1.0))))
+
+    def gains(self, now: Sequence[float]) -> list[float]:
+        """How much more it shows of every pair than a recording of which the same is known [-]."""
+        return [float(np.sqrt(new / max(old, 1.0))) for new, old in zip(self.energies, now, strict=True)]
+
+    def told(self, now: Sequence[float]) -> list[int]:
+        """Which pairs it tells apart, and better than that recording."""
+        better = enumerate(zip(self.energies, self.gains(now), strict=True))
+        return [k for k, (energy, gain) in better if energy >= SMALLEST_ENERGY and gain >= WORTHWHILE]
+
+
+def _shown(
+    design: "_Design", plans: Sequence[_Plan], enough: Callable[[_Shown], bool]
+) -> tuple[list[_Shown], list[str]]:
+    """What the motions of plans show, until one is enough, and why there is none where there is none."""
+    shown: list[_Shown] = []
+    reasons: list[str] = []
+    attempts = side_by_side(design, plans)
+    for attempt in attempts:
+        if isinstance(attempt, str):
+            reasons.append(attempt)
+            continue
+        shown.append(attempt)
+        if enough(attempt):
+            break
+    attempts.close()
+    return shown, reasons
 
 
 def _plans(robot: Robot, pair: Pair) -> list[_Plan]:
@@ -188,7 +243,7 @@ def _plans(robot: Robot, pair: Pair) -> list[_Plan]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Attempt:
+class _Design:
     """Designs motions and asks them to tell effects from each other.
 
     Attributes:
@@ -205,7 +260,13 @@ class _Attempt:
     robot: Robot
     motors: PredictedMotors | None
 
-    def __call__(self, plan: _Plan) -> tuple[Excitation, list[float]] | str:
+    @property
+    def links(self) -> LinksInside | None:
+        """Links are to be kept inside wherever it can be computed where the springs take them."""
+        joints = (self.robot.joint_names[int(i)] for i in self.robot.elastic_indices)
+        return LinksInside() if all(self.robot.spring(joint).stiffness for joint in joints) else None
+
+    def __call__(self, plan: _Plan) -> _Shown | str:
         """The motion of a plan and what it shows of every pair; why there is none, where there is none."""
         bench = self.bench
         try:
@@ -215,19 +276,24 @@ class _Attempt:
                     self.robot,
                     base_frequency=1.0 / bench.data.period,
                     harmonics=HARMONICS,
-                    starts=STARTS,
+                    starts=STARTS if plan.begun is None else 0,
+                    start=None if plan.begun is None else plan.begun.series.coefficients,
                     seed=plan.seed,
                     criterion=plan.criterion,
                     effects=plan.effects,
                     motors=self.motors if plan.springs else None,
+                    links=LinksAsPlanned() if plan.begun is None else self.links,
+                    tolerance_factor=TOLERANCE_FACTOR,
                     noise=_row_noise(bench, self.noise) if plan.springs else None,
                     rate=_rate(bench),
                     jobs=1,
                 )
         except (SeaIdentError, np.linalg.LinAlgError) as error:
             return str(error)
+        if plan.begun is not None:
+            excitation = replace(excitation, starts=plan.begun.starts, start_values=plan.begun.start_values)
         there = Bench(_data_of(bench.data, self.robot, excitation.series, self.motors), bench.effects)
-        return excitation, [separation(there, self.noise, pair) for pair in self.pairs]
+        return _Shown(plan, excitation, [separation(there, self.noise, pair) for pair in self.pairs])
 
 
 def _rate(bench: Bench) -> float:

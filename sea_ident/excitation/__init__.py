@@ -14,7 +14,7 @@ from sea_ident.excitation.design import design_excitation
 from sea_ident.excitation.design_model import reduced_effects
 from sea_ident.excitation.efficiency import EfficiencyBound, bound_log_det
 from sea_ident.excitation.joint_trajectory import write_trajectory_bag, write_trajectory_yaml
-from sea_ident.excitation.links_inside import LinksInside
+from sea_ident.excitation.links_inside import LinksAsPlanned, LinksInside
 from sea_ident.excitation.ramp import Ramp, RampMotion
 from sea_ident.excitation.result import Excitation, read_excitation
 from sea_ident.excitation.springs import PredictedMotors
@@ -29,6 +29,7 @@ __all__ = [
     "EOptimality",
     "EfficiencyBound",
     "Excitation",
+    "LinksAsPlanned",
     "LinksInside",
     "PredictedMotors",
     "Progress",

@@ -59,7 +59,7 @@ def keep_links_inside(
             if found is None:
                 break
             gain, (value, best) = found[0] - value, found
-            small = small + 1 if gain < _SMALL * problem.criterion.tolerance else 0
+            small = small + 1 if gain < _SMALL * problem.tolerance(problem.criterion) else 0
             if small == 2:
                 break
     except KeyboardInterrupt:
@@ -107,7 +107,7 @@ def _raised(
         point,
         iterations=_STEPS,
         barrier=1e-2,
-        tolerance=problem.criterion.tolerance,
+        tolerance=problem.tolerance(problem.criterion),
     )
     for part in _PARTS:
         ahead = point + part * (end - point)

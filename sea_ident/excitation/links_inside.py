@@ -37,6 +37,14 @@ class LinksInside:
             raise ExcitationError(f"the reserve of the limits is {self.reserve}; it must be from 0 to below 1")
 
 
+@dataclass(frozen=True)
+class LinksAsPlanned:
+    """Ask for a design for theta = q: a controller moves the links themselves along the trajectory.
+
+    Where the springs would take them while the motors play it is then not computed.
+    """
+
+
 @dataclass(frozen=True, eq=False)
 class OnSprings:
     """A design, and where its links go on their springs.
@@ -75,19 +83,24 @@ def check_stiffness(robot: Robot) -> None:
 
 
 def look_at_links(
-    problem: Problem, coefficients: FloatArray, wanted: LinksInside | None, notes: list[str], *, hurry: bool
+    problem: Problem,
+    coefficients: FloatArray,
+    wanted: LinksInside | LinksAsPlanned | None,
+    notes: list[str],
+    *,
+    hurry: bool,
 ) -> OnSprings:
     """Find out where links go on their springs, and keep them inside where that is asked for or they would swing.
 
     Args:
         problem: what was raised, inside what.
         coefficients: (n, 2 L + 1) design, inside for theta = q.
-        wanted: asks for links that are kept inside in any case.
+        wanted: asks for links that are kept inside in any case, or that go where they are planned.
         notes: a change of the design, or that none was found, is added here.
         hurry: whether a change is to take as little time as it can.
     """
     springs = Springs.of(problem.robot, problem.model.springs)
-    if not len(springs.joints):
+    if isinstance(wanted, LinksAsPlanned) or not len(springs.joints):
         return OnSprings(coefficients, {}, {}, "")
     limits = ElasticLimits(springs, problem.limits, problem.dynamic, problem.space)
     lowest = springs.lowest_frequency(problem.centre[:, -1])
@@ -129,7 +142,7 @@ def look_at_links(
     if beyond:
         beyond += (
             "; links=LinksInside() (--links-inside 0.05) keeps them inside, and so does a controller that moves the "
-            "links themselves along the trajectory"
+            "links themselves along the trajectory (links=LinksAsPlanned(), --links-as-planned)"
         )
     return OnSprings(series.coefficients, told, {}, beyond)
 

@@ -52,6 +52,7 @@ class Problem:
         space: half-spaces and self-collision.
         walls: all of them, on grids of times.
         centre: (n, 2 L + 1) a trajectory at rest, well inside.
+        tolerance_factor: on the gains that are too small to go on for [-].
     """
 
     robot: Robot
@@ -63,6 +64,7 @@ class Problem:
     space: SpaceLimits
     walls: tuple[Wall, ...]
     centre: FloatArray
+    tolerance_factor: float = 1.0
 
     @staticmethod
     def of(
@@ -167,6 +169,10 @@ class Problem:
     def limit_names(self) -> tuple[str, ...]:
         """(m,) names in the order of `margins`."""
         return (*self.limits.names, *self.dynamic.names, *self.space.names)
+
+    def tolerance(self, criterion: Criterion) -> float:
+        """Gain of a step by a criterion that is too small to go on for."""
+        return self.tolerance_factor * criterion.tolerance
 
     def outside(self, coefficients: FloatArray) -> list[str]:
         """Which limits a trajectory violates, and by how much."""

@@ -87,10 +87,11 @@ class Excitation:
 
     def summary(self) -> str:
         """Criterion and margins as text."""
+        how = f"best of {self.starts} starts" if self.starts else "the trajectory as it was given, or moved inside,"
         lines = [
             f"excitation of {self.robot}: {len(self.joint_names)} joints, {self.series.harmonics} harmonics of "
             f"{self.base_frequency:g} Hz, {len(self.parameters)} parameters",
-            f"  criterion {self.criterion}: {self.value:.4f}; best of {self.starts} starts in {self.seconds:.1f} s",
+            f"  criterion {self.criterion}: {self.value:.4f}; {how} in {self.seconds:.1f} s",
             f"  log det {self.log_det:.4f}, condition number {self.condition_number:.4g} "
             f"({self.raw_condition_number:.4g} without normalisation), {self.samples} samples",
         ]

@@ -72,7 +72,7 @@ def climb_from_starts(
 
     Args:
         problem: what to raise, inside what.
-        starts: number of random starts.
+        starts: number of random starts; 0 keeps a given one as it is, moved inside.
         seed: of the random numbers; start k draws from a stream of its own.
         given: (n, 2 L + 1) a further start.
         jobs: at the same time; threads, unless `joblib.parallel_config` names another backend.
@@ -81,6 +81,8 @@ def climb_from_starts(
     Returns:
         The best trajectory; by its own criterion it is never below the D-optimal one from the same starts.
     """
+    if given is not None and not starts:
+        return Found(_moved_inside(problem, given) if problem.outside(given) else given, (), interrupted=False)
     search = _Search(problem, starts, seed, given, jobs, progress)
     if isinstance(problem.criterion, DOptimality):
         return search.run()
@@ -220,9 +222,7 @@ def _scout(problem: Problem, board: Board, seed: int, given: FloatArray | None, 
         if start >= board.starts and given is not None:
             # limits are convex: what lies between two trajectories inside is inside too
             share = draw / (_DRAWS - 1)
-            point = share * point + (1.0 - share) * repair(
-                problem.limits, problem.base_frequency, problem.centre, given
-            )
+            point = share * point + (1.0 - share) * _nearest(problem, given)
         point = _loosen(problem, point)
         information = problem.coarse(_SCOUT_SAMPLES * problem.harmonics, 0.3 * _speed(problem, point))
         if np.isfinite(problem.value(information, point)):
@@ -232,7 +232,7 @@ def _scout(problem: Problem, board: Board, seed: int, given: FloatArray | None, 
     board.latest[start] = point
     # the way of log det and that of the criterion itself may lead to different optima
     criterion = problem.criterion if start % 2 else DOptimality()
-    _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, _COARSE * criterion.tolerance)
+    _raise(problem, information, criterion, board, start, _SCOUT_STEPS, 1e-2, _COARSE * problem.tolerance(criterion))
     return problem.value(information, board.latest[start])
 
 
@@ -240,13 +240,13 @@ def _climb(problem: Problem, board: Board, start: int) -> None:
     """Climb until little is left to gain."""
     information = detailed(problem, board.latest[start])
     criterion = problem.criterion
-    _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, _COARSE * criterion.tolerance)
+    _raise(problem, information, criterion, board, start, _CLIMB_STEPS, 1e-3, _COARSE * problem.tolerance(criterion))
 
 
 def _polish(problem: Problem, information: Information, board: Board, start: int) -> None:
     """Climb to the end."""
     criterion = problem.criterion.refined()
-    _raise(problem, information, criterion, board, start, _POLISH_STEPS, 1e-5, criterion.tolerance)
+    _raise(problem, information, criterion, board, start, _POLISH_STEPS, 1e-5, problem.tolerance(criterion))
 
 
 def detailed(problem: Problem, point: FloatArray) -> Information:
@@ -292,7 +292,7 @@ def _move(
         _loosen(problem, point),
         iterations=_CLIMB_STEPS,
         barrier=1e-2,
-        tolerance=_COARSE * problem.criterion.tolerance,
+        tolerance=_COARSE * problem.tolerance(problem.criterion),
         report=hopeless,
     )
     return problem.value(information, point), point
@@ -347,6 +347,16 @@ def _singular(problem: Problem, information: Information, point: FloatArray) -> 
         f"no trajectory was found that shows all {len(matrix)} parameters; least visible: {', '.join(hidden)}. Take "
         f"more harmonics, wider limits, or fewer effects"
     )
+
+
+def _nearest(problem: Problem, given: FloatArray) -> FloatArray:
+    """The trajectory inside all linear limits that is nearest to a given one."""
+    return repair(problem.limits, problem.base_frequency, problem.centre, given)
+
+
+def _moved_inside(problem: Problem, given: FloatArray) -> FloatArray:
+    """The same, shrunk until the other limits hold for all t too."""
+    return problem.settle(_loosen(problem, _nearest(problem, given)))
 
 
 def _loosen(problem: Problem, point: FloatArray) -> FloatArray:

@@ -10,10 +10,21 @@ import pytest
 import sea_ident
 from sea_ident.discrepancy import Diagnosis, LackOfFit, Verdict, next_experiment
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.findings import Alternative, MissingEffect
-from sea_ident.discrepancy.next_experiment import _data_of, _identified, with_next_experiment
+from sea_ident.discrepancy.next_experiment import (
+    Pair,
+    _data_of,
+    _identified,
+    _Plan,
+    _Shown,
+    propose,
+    with_next_experiment,
+)
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.excitation import DOptimality
 from sea_ident.motion import FourierSeries
 from sea_ident.simulation import PlantedEffect, simulate
 
@@ -71,6 +82,62 @@ def test_what_belongs_to_the_periods_of_the_recording_is_not_in_the_proposed_mot
     np.testing.assert_array_equal(proposed.target(proposed.tau_motor), 0.0)
     assert len(proposed.starts) == proposed.periods == 0
     assert np.all(np.isfinite(Bench(proposed, laboratory.effects).design(laboratory.effects)))
+
+
+@pytest.fixture(scope="module")
+def offset(laboratory):
+    """The bench of a knee that moves little, its spring that is off or its encoder, and the identified model."""
+    small = replace(laboratory.motions[0], a=0.3 * laboratory.motions[0].a, b=0.3 * laboratory.motions[0].b)
+    hidden = PlantedEffect(make_effect("spring_offset", "knee"), np.array([0.5]))
+    recording = simulate(laboratory.leg, small, periods=8, seed=3, effects=[hidden]).recording
+    bench = Bench(period_data(wide_processing(recording, laboratory.leg, PERIOD), laboratory.leg), laboratory.effects)
+    settled = settle(bench, bench.effects)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
+    names = ("spring_offset", "encoder_offset")
+    own, rival = (bench.refine((*bench.effects, make_effect(name, "knee")), settled.noise) for name in names)
+    return bench, settled.noise, Pair(own, len(bench.effects), rival, len(bench.effects)), model
+
+
+@pytest.mark.scenario
+def test_links_of_the_proposed_motion_stay_inside_where_their_springs_take_them(offset):
+    """It is played on a robot whose springs give way: by the usual design for theta = q limits would not hold."""
+    bench, noise, pair, model = offset
+    proposed, _ = propose(bench, noise, [pair], model)
+    record = proposed.excitation
+    assert min(record["margins"].values()) >= 0.0
+    assert min(record["link_margins"].values()) >= 0.0
+    assert record["starts"] == 1
+
+
+ENERGIES = {1: (50.0, 40.0), 2: (60.0, 5.0), 3: (70.0, 60.0)}
+"""By seed, of a motion as it is planned and with its links inside."""
+
+
+@pytest.mark.parametrize(("kept_by_three", "kept"), [(60.0, [3]), (5.0, [3, 2, 1])])
+def test_links_are_kept_inside_for_the_best_motion_unless_it_then_tells_nothing(
+    monkeypatch, offset, kept_by_three, kept
+):
+    bench, noise, pair, model = offset
+    energies = {**ENERGIES, 3: (70.0, kept_by_three)}
+    asked = []
+
+    def designed(plan):
+        if plan.begun is not None:
+            asked.append(plan.seed)
+        excitation = SimpleNamespace(series=None, to_dict=lambda: {"seed": plan.seed})
+        return _Shown(plan, excitation, [energies[plan.seed][plan.begun is not None]])
+
+    plans = [_Plan(DOptimality(), None, springs=False, seed=seed) for seed in (1, 2, 3)]
+    monkeypatch.setattr(next_experiment, "_plans", lambda *_: plans)
+    monkeypatch.setattr(next_experiment, "_Design", lambda *_: designed)
+    monkeypatch.setattr(next_experiment, "separation", lambda *_: 4.0)
+    proposed, notes = propose(bench, noise, [pair], model)
+    assert asked == kept
+    assert proposed.excitation == {"seed": 3 if kept == [3] else 1}
+    assert proposed.gain == pytest.approx(np.sqrt((60.0 if kept == [3] else 40.0) / 4.0))
+    assert notes == ()
 
 
 @pytest.mark.parametrize(

@@ -204,6 +204,37 @@ def test_given_start_inside_is_never_made_worse(exo, plain):
     assert len(again.start_values) == 2
 
 
+def test_a_trajectory_of_ones_own_is_judged_as_it_is(exo, plain):
+    found = design_excitation(exo, start=plain.series.coefficients, harmonics=4, starts=0, rate=50.0)
+    np.testing.assert_array_equal(found.series.coefficients, plain.series.coefficients)
+    assert found.log_det == plain.log_det
+    assert found.margins == plain.margins
+    assert found.start_values == ()
+    assert "as it was given" in found.summary()
+
+
+def test_a_trajectory_of_ones_own_outside_the_limits_is_moved_inside(exo, plain):
+    wide = plain.series.coefficients.copy()
+    wide[:, :-1] *= 1.2
+    with pytest.warns(SeaIdentWarning, match="start is outside the limits"):
+        found = design_excitation(exo, start=wide, harmonics=4, starts=0, rate=50.0)
+    assert min(found.margins.values()) >= 0.0
+    assert violations(exo, found.series, 20_000) <= 1e-9
+    assert found.log_det > plain.log_det - 2.0
+
+
+def test_larger_gains_that_are_left_save_steps_and_cost_little(exo):
+    steps = {}
+    for factor in (1.0, 100.0):
+        told = []
+        found = design_excitation(
+            exo, harmonics=4, starts=2, rate=50.0, jobs=1, tolerance_factor=factor, progress=told.append
+        )
+        steps[factor] = len(told), found.log_det
+    assert steps[100.0][0] < 0.7 * steps[1.0][0]
+    assert steps[1.0][1] - 1.5 < steps[100.0][1] <= steps[1.0][1]
+
+
 def test_given_start_outside_is_moved_inside_and_said(exo):
     outside = np.zeros((3, 9))
     outside[:, -1] = 5.0
@@ -361,6 +392,8 @@ def test_other_robots(robot_of, name):
         ({"harmonics": 2.5}, "harmonics is 2.5; it must be a whole number"),
         ({"harmonics": 1000}, "1000 harmonics of 0.1 Hz reach 100 Hz, which is not below half the sampling rate"),
         ({"seed": -1}, "seed is -1"),
+        ({"tolerance_factor": 0.0}, "tolerance_factor is 0.0; it must be a positive number"),
+        ({"tolerance_factor": np.inf}, "tolerance_factor is inf"),
         ({"effects": ()}, "effects is empty"),
     ],
 )

@@ -5,7 +5,7 @@ import pytest
 from soft_arms import soft_arm
 
 from sea_ident.exceptions import ExcitationError, SeaIdentWarning
-from sea_ident.excitation import LinksInside, design_excitation, read_excitation
+from sea_ident.excitation import LinksAsPlanned, LinksInside, design_excitation, read_excitation
 from sea_ident.excitation.elastic_response import Springs, elastic_response
 from sea_ident.excitation.linear_limits import linear_limits
 from sea_ident.simulation import SensorNoise, VelocityController, simulate
@@ -89,6 +89,15 @@ def test_links_that_sag_are_told_and_kept_where_that_is_asked_for(robot_of, tmp_
     spare = design_excitation(leg, harmonics=4, starts=2, rate=50.0, links=LinksInside(reserve=0.1))
     assert spare.link_margins["hip.acceleration"] >= 0.1 * np.pi
     assert spare.log_det < inside.log_det
+
+
+def test_links_that_a_controller_moves_as_planned_are_not_asked_where_springs_take_them(arm):
+    """The design is that for theta = q, also where links would swing, and nothing is said of springs."""
+    planned = design_excitation(arm, links=LinksAsPlanned(), **SMALL)
+    rigid = design_excitation(soft_arm(None), **SMALL)
+    np.testing.assert_array_equal(planned.series.coefficients, rigid.series.coefficients)
+    assert planned.link_margins == {}
+    assert planned.warnings == ()
 
 
 def test_links_that_cannot_be_kept_inside_are_said(arm):

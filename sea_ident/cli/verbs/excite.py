@@ -52,6 +52,14 @@ def excite(
             "only where links would swing.",
         ),
     ] = None,
+    links_as_planned: Annotated[
+        bool,
+        typer.Option(
+            "--links-as-planned",
+            help="A controller moves the links themselves along the trajectory: where springs would take them is not "
+            "looked at.",
+        ),
+    ] = False,
     ramp: Annotated[
         float | None,
         typer.Option(
@@ -82,9 +90,12 @@ def excite(
     as_json: AsJson = False,
 ) -> None:
     """Design an exciting trajectory inside the limits of a robot. Ctrl-C keeps the best so far."""
-    from sea_ident.excitation import LinksInside, Ramp, design_excitation
+    from sea_ident.exceptions import SeaIdentError
+    from sea_ident.excitation import LinksAsPlanned, LinksInside, Ramp, design_excitation
     from sea_ident.excitation.joint_trajectory import bag_types
 
+    if links_as_planned and links_inside is not None:
+        raise SeaIdentError("--links-as-planned does not look at what --links-inside is to keep; give one of them")
     _check_targets(out, csv, yaml, bag, inputs=(robot, annotation))
     _check_samples(base_frequency, harmonics, rate, periods, csv is not None, yaml is not None or bag is not None)
     if bag is not None:
@@ -106,7 +117,7 @@ def excite(
             starts=starts,
             seed=seed,
             limits=limits,
-            links=None if links_inside is None else LinksInside(links_inside),
+            links=LinksAsPlanned() if links_as_planned else None if links_inside is None else LinksInside(links_inside),
             ramp=None if ramp is None else Ramp(ramp),
             jobs=jobs,
             progress=report,
