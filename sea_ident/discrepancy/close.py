@@ -151,6 +151,12 @@ def close_gap(
         history.append(diagnosis)
         notes.extend(text for text in diagnosis.warnings if text not in notes)
         found = {m.title for m in diagnosis.missing}
+        if diagnosis.verdict is Verdict.AMBIGUOUS and diagnosis.model is not None:
+            unsure = ", ".join(sorted(m.title for m in diagnosis.missing if m.alternatives))
+            notes.append(
+                f"nothing was added, as other effects explain the data as well as {unsure}; the model of the last "
+                "diagnosis, rounds[-1].model, has what it names and predicts such motion as well"
+            )
         if diagnosis.verdict not in NAMED or found <= known:
             break
         names = ", ".join(sorted(found))

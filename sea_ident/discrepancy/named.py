@@ -1,5 +1,6 @@
 """Effects that a search or a test of trends found, with the numbers that are told of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,37 +33,54 @@ def named_effects(
     """
     fit, stds = selection.final.fit, uncertainties(bench, selection.final)
     first = len(fit.effects) - selection.added
-    counts = bench.counts(fit.effects)
     out = []
     nameless = resting(selection, held)
     for k, position in enumerate(range(first, len(fit.effects))):
         if k in nameless:
             continue
-        effect = fit.effects[position]
-        begin = sum(counts[:position])
-        columns = fit.columns[begin : begin + counts[position]]
-        seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
-        parameters = [
-            MissingParameter(c.name, float(fit.values[begin + i]), float(stds[begin + i]), c.unit)
-            for i, c in enumerate(columns)
-            if seen[i]
-        ]
-        parameters.extend(_shape_parameters(bench, fit, position, stds))
         transfer = held.transfers[k] if held is not None and held.transfers else None
-        out.append(
-            MissingEffect(
-                effect=effect.name,
-                joint=effect.joint,
-                parameters=tuple(parameters),
-                torque_share=own_torque(bench, fit, position),
-                p_value=selection.p_values[k],
-                alternatives=tuple(replace(each, fit=None) for each in alternatives.get(position, ())),
-                transfer=None if transfer is None or not transfer.tested else transfer.share,
-                detail=effect,
-                values=tuple(float(v) for v in fit.values[begin : begin + counts[position]]),
-            )
-        )
+        found = named_effect(bench, fit, position, stds, selection.p_values[k], alternatives.get(position, ()))
+        out.append(replace(found, transfer=None if transfer is None or not transfer.tested else transfer.share))
     return out
+
+
+def named_effect(
+    bench: Bench,
+    fit: Fit,
+    position: int,
+    stds: FloatArray,
+    p_value: float,
+    alternatives: Sequence[Alternative],
+) -> MissingEffect:
+    """An effect that was found, with the numbers that are told of it.
+
+    Args:
+        bench: the recording.
+        fit: the model with it.
+        position: of it among the effects.
+        stds: (p + s,) standard deviations of the parameters, and of the shapes in the order of `free_shapes`.
+        p_value: probability of finding as much where nothing is missing.
+        alternatives: what else it may be.
+    """
+    effect, counts = fit.effects[position], bench.counts(fit.effects)
+    own = range(sum(counts[:position]), sum(counts[: position + 1]))
+    seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
+    parameters = [
+        MissingParameter(fit.columns[i].name, float(fit.values[i]), float(stds[i]), fit.columns[i].unit)
+        for i, shown in zip(own, seen, strict=True)
+        if shown
+    ]
+    parameters.extend(_shape_parameters(bench, fit, position, stds))
+    return MissingEffect(
+        effect=effect.name,
+        joint=effect.joint,
+        parameters=tuple(parameters),
+        torque_share=own_torque(bench, fit, position),
+        p_value=p_value,
+        alternatives=tuple(replace(each, fit=None) for each in alternatives),
+        detail=effect,
+        values=tuple(float(fit.values[i]) for i in own),
+    )
 
 
 def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray) -> list[MissingParameter]:

@@ -32,6 +32,7 @@ from sea_ident.discrepancy.findings import (
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, significance, torque_change
 from sea_ident.discrepancy.lacking import candidate_effects
+from sea_ident.discrepancy.named import named_effect
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
@@ -247,36 +248,9 @@ def _confirmed(bench: StretchBench, start: Settled, now: Settled, p_values: tupl
 
 
 def _missing(bench: StretchBench, fit: Fit, found: list[_Found], added: int) -> list[MissingEffect]:
-    first = len(fit.effects) - added
-    counts = bench.counts(fit.effects)
-    out = []
-    for k, item in enumerate(found):
-        position = first + k
-        effect, begin = fit.effects[position], sum(counts[:position])
-        own = range(begin, begin + counts[position])
-        values = [
-            MissingParameter(fit.columns[i].name, float(fit.values[i]), fit.std(i), fit.columns[i].unit) for i in own
-        ]
-        values.extend(
-            MissingParameter(
-                effect.parameter_name(shape.name), float(getattr(effect, shape.name)), 0.0,
-                effect.shape_unit(shape, bench.robot),
-            )
-            for shape in effect.ranges
-        )  # fmt: skip
-        out.append(
-            MissingEffect(
-                effect=effect.name,
-                joint=effect.joint,
-                parameters=tuple(values),
-                torque_share=own_torque(bench, fit, position),
-                p_value=item.p_value,
-                alternatives=item.alternatives,
-                detail=effect,
-                values=tuple(float(fit.values[i]) for i in own),
-            )
-        )
-    return out
+    """What was found; what the model leaves counts as noise already."""
+    first, stds = len(fit.effects) - added, np.linalg.norm(fit.covariance_factor, axis=1)
+    return [named_effect(bench, fit, first + k, stds, item.p_value, item.alternatives) for k, item in enumerate(found)]
 
 
 def _missing_pushes(processed: ProcessedRecording, robot: Robot, pushes: tuple[Push, ...]) -> list[MissingEffect]:

@@ -9,7 +9,7 @@ import sea_ident
 from sea_ident.discrepancy import close
 from sea_ident.discrepancy.data import wide_processing
 from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import LackOfFit, MissingEffect, Verdict
+from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, Verdict
 from sea_ident.discrepancy.forward import command_of, simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, read_model
@@ -155,6 +155,22 @@ def test_what_is_named_and_cannot_be_added_is_said(models, recordings, monkeypat
         "there is no repaired model: why",
         "link_friction at knee: named, but not added, for there is no repaired model",
     )
+
+
+@pytest.mark.scenario
+def test_what_is_ambiguous_is_not_added_and_it_is_said_which_model_has_it(models, recordings, monkeypatch):
+    others = (Alternative("encoder_offset", "knee", 1.0),)
+    missing = (
+        MissingEffect("torque_ripple", "hip", (), 0.1, 1e-9, ()),
+        MissingEffect("spring_offset", "knee", (), 0.1, 1e-9, others),
+    )
+    found = Diagnosis(Verdict.AMBIGUOUS, "", NOTHING_LACKS, missing=missing, model=models[1])
+    monkeypatch.setattr(close, "diagnose", lambda *_, **__: found)
+    closed = sea_ident.close_gap(models[0], recordings[0])
+    assert closed.model is models[0]
+    assert closed.added == ()
+    assert len(closed.warnings) == 1
+    assert "explain the data as well as spring_offset at knee; the model of the last diagnosis" in closed.warnings[0]
 
 
 @pytest.mark.scenario

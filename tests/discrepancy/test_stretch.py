@@ -1,12 +1,16 @@
 """One stretch: what a model leaves of it is its noise, and an effect is one that predicts blocks from other blocks."""
 
+import warnings
+
 import numpy as np
 import pytest
 
+import sea_ident
 from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.pushes import find_pushes
 from sea_ident.discrepancy.stretch import BLOCKS, StretchBench, block_errors, full_residual, stretch_data
 from sea_ident.effects import make_effect
+from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import filter_recording
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*no period.*:sea_ident.exceptions.SeaIdentWarning")
@@ -105,3 +109,16 @@ def test_a_planted_push_is_found_and_a_clean_stretch_has_none(laboratory, clean)
     # filtered differentiation spreads an edge over some samples
     assert all(BEGIN - 0.1 < p.start < END + 0.1 for p in found)
     assert min(p.start for p in found) == pytest.approx(BEGIN, abs=0.05)
+
+
+@pytest.mark.scenario
+def test_sizes_and_shapes_from_one_stretch_have_standard_deviations_that_hold(laboratory):
+    recording = laboratory.record([("torque_ripple", "hip", [2.0, 1.0], {"order": 4.0})], periods=1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = sea_ident.diagnose(sea_ident.identify(laboratory.leg, recording), recording)
+    assert [(m.effect, m.joint) for m in found.missing] == [("torque_ripple", "hip")]
+    parameters = {p.name.rpartition("_")[2]: p for p in found.missing[0].parameters}
+    for name, truth in (("sine", 2.0), ("cosine", 1.0), ("order", 4.0)):
+        assert 0.0 < parameters[name].std < 0.2
+        assert abs(parameters[name].value - truth) < 4.0 * parameters[name].std
