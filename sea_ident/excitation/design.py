@@ -72,9 +72,10 @@ def design_excitation(
         motors: how motor positions follow from those of the links; theta = q by default. With `PredictedMotors` the
             effects of springs can be among the effects; the rows of links and motors are then kept apart.
         links: ask for links that stay inside the limits where their springs take them while the motors play the
-            trajectory. By default so only where the harmonics come near the frequencies at which the links swing;
-            elsewhere what they leave is in the warnings of the result. `LinksAsPlanned()` leaves all that out, for a
-            controller that moves the links themselves along the trajectory.
+            trajectory. By default so only where the harmonics come near the frequencies at which the links swing, or
+            the links would leave a limit by a fifth of its range; else what they leave is in the warnings of the
+            result. `LinksAsPlanned()` leaves all that out, for a controller that moves the links themselves along the
+            trajectory.
         rate: samples per second of the observation matrix [Hz].
         information: (p, p) information about the base parameters of `effects` that is there already.
         noise: (n,) standard deviation of the torque noise of each joint [N m]; 1 by default. With `motors`, (2 n,) may

@@ -28,6 +28,7 @@ class ElasticWall:
         upper: (r, M) highest values.
         middle: (r, 1) values at rest.
         rows: (r, M, v) slopes by the coefficients.
+        bend: (r, M) what the slopes miss.
         rest: (n, 2 L + 1) trajectory at rest.
     """
 
@@ -35,6 +36,7 @@ class ElasticWall:
     upper: FloatArray
     middle: FloatArray
     rows: FloatArray
+    bend: FloatArray
     rest: FloatArray
 
     def values(self, coefficients: FloatArray) -> FloatArray:
@@ -50,8 +52,8 @@ class ElasticWall:
         return DynamicTangent(self.rows)
 
     def overshoot(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """By parabolas through neighbouring points."""
-        return parabolic_overshoot(values)
+        """By parabolas through neighbouring points of all that is limited: without its bend it turns over elsewhere."""
+        return parabolic_overshoot(values + self.bend)
 
 
 def elastic_wall(limits: ElasticLimits, motors: FourierSeries, rest: FloatArray) -> ElasticWall | None:
@@ -86,6 +88,7 @@ def elastic_wall(limits: ElasticLimits, motors: FourierSeries, rest: FloatArray)
         np.maximum(upper - bend, middle + _LEAST_ROOM * (upper - middle)),
         middle,
         rows,
+        bend,
         rest,
     )
 

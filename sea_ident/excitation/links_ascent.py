@@ -20,7 +20,7 @@ _STEPS = 30
 # slopes of a wall, 400 MB
 _LARGEST = 5e7
 # gains, in units of the criterion's tolerance, that are not worth another round
-_SMALL = 20.0
+_SMALL = 200.0
 # of an ascent that leads outside: how much of it is tried, and how far that is shrunk toward rest
 _PARTS = (1.0, 0.5, 0.25, 0.1, 0.04)
 _SHRUNK = (1.0, 0.99, 0.96, 0.9)

@@ -16,6 +16,9 @@ NEAR = 0.6
 """Part of the lowest frequency of the links on their springs from which on a harmonic makes them swing: an undamped one
 then follows with 1.6 times the amplitude."""
 
+FAR_BEYOND = 0.2
+"""Part of the range of a limit by which links that leave it are kept inside though they do not swing."""
+
 # limits that a note names, and the part of its range by which links on stiff springs may leave a limit untold
 _NAMED = 6
 _UNTOLD = 0.01
@@ -106,17 +109,27 @@ def look_at_links(
     lowest = springs.lowest_frequency(problem.centre[:, -1])
     highest = problem.harmonics * problem.base_frequency
     chosen: FloatArray | None = coefficients
-    looked_after = wanted is not None or highest > NEAR * lowest
+    why = ""
+    if highest > NEAR * lowest:
+        why = (
+            f"harmonics up to {highest:.4g} Hz come near the {lowest:.4g} Hz at which links swing on their springs: "
+            "the trajectory"
+        )
+    elif wanted is None:
+        planned = limits.margins(problem.series(coefficients))
+        if planned is not None and float((planned / limits.sizes).min(initial=0.0)) < -FAR_BEYOND:
+            why = f"of the trajectory for links that go with their motors, {_beyond(limits, planned, _UNTOLD)}: this"
+    looked_after = wanted is not None or bool(why)
     if looked_after:
         inner = limits.tightened((wanted or LinksInside()).reserve)
         chosen = keep_links_inside(problem, inner, coefficients, hurry=hurry)
         if chosen is not None and chosen is not coefficients and wanted is None:
             notes.append(
-                f"harmonics up to {highest:.4g} Hz come near the {lowest:.4g} Hz at which links swing on their "
-                f"springs: the trajectory is one with which the links stay inside the limits, and tells less "
+                f"{why} is one with which the links stay inside the limits, and tells less "
                 f"({problem.reported(chosen):.4g} instead of {problem.reported(coefficients):.4g}); fewer harmonics or "
                 f"a lower base frequency may tell more. What a controller misses makes links swing too: a reserve "
-                f"above {LinksInside().reserve:g} (links=LinksInside(reserve=...), --links-inside) leaves room for it"
+                f"above {LinksInside().reserve:g} (links=LinksInside(reserve=...), --links-inside) leaves room for it. "
+                "With a controller that moves the links themselves, links=LinksAsPlanned() (--links-as-planned)"
             )
     series = problem.series(coefficients if chosen is None else chosen)
     margins = limits.margins(series)

@@ -7,6 +7,7 @@ from test_elastic_limits import limits_of
 from sea_ident.excitation.elastic_response import elastic_response
 from sea_ident.excitation.elastic_wall import elastic_wall
 from sea_ident.excitation.feasibility import at_rest
+from sea_ident.excitation.walls import parabolic_overshoot
 from sea_ident.motion import FourierSeries
 
 
@@ -30,6 +31,10 @@ def test_room_and_slopes_are_true_where_they_were_taken(robot_of, name):
     room = (wall.upper - wall.values(coefficients))[:m]
     inside = np.isfinite(room) & (limits.linear.upper[:, None] - here[:m] > 0.1)
     np.testing.assert_allclose(room[inside], (limits.linear.upper[:, None] - here[:m])[inside], rtol=1e-6, atol=1e-6)
+    # what lies between the points of the grid is that of the links themselves
+    for told, expected in zip(wall.overshoot(wall.values(coefficients)), parabolic_overshoot(here), strict=True):
+        np.testing.assert_allclose(told, expected, atol=1e-9 * np.abs(here).max())
+        assert np.any(expected > 0.0)
     change = 1e-5 * np.random.default_rng(5).normal(size=rest.shape)
     difference = (true(coefficients + change) - true(coefficients - change)) / 2.0
     along = wall.tangent(coefficients).push(change)
