@@ -57,6 +57,7 @@ CASES = (
     Hidden("spring_offset", "hip", (1.0,), 0.3),
     Hidden("encoder_offset", "knee", (), 0.3, (("offset", 0.01),)),
     Hidden("torque_offset", "hip", (1.0,), 0.15),
+    Hidden("torque_constant", "hip", (0.05,), 0.2),
 )
 
 

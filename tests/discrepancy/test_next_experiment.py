@@ -29,14 +29,19 @@ from sea_ident.motion import FourierSeries
 from sea_ident.simulation import PlantedEffect, simulate
 
 PERIOD = 5.0
-CASES = (("spring_offset", (0.5,), {}), ("backlash", (200.0,), {"half_width": 0.004}))
+CASES = (
+    ("spring_offset", "knee", (0.5,), {}, 0.3),
+    ("backlash", "knee", (200.0,), {"half_width": 0.004}, 0.3),
+    ("torque_constant", "hip", (0.08,), {}, 0.2),
+)
+"""Effect, joint, values, shape, and how much of a good motion the first one is."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "values", "shape"), CASES)
-def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(leg, series, name, values, shape):
-    motion = replace(series[0], a=0.3 * series[0].a, b=0.3 * series[0].b)
-    hidden = PlantedEffect(make_effect(name, "knee", **shape), np.array(values))
+@pytest.mark.parametrize(("name", "joint", "values", "shape", "amplitude"), CASES)
+def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(leg, series, name, joint, values, shape, amplitude):
+    motion = replace(series[0], a=amplitude * series[0].a, b=amplitude * series[0].b)
+    hidden = PlantedEffect(make_effect(name, joint, **shape), np.array(values))
     verdicts = []
     for number in range(3):
         with warnings.catch_warnings():
@@ -53,7 +58,7 @@ def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(leg, series, name, 
         motion = FourierSeries(record["base_frequency"], *coefficients)
     assert verdicts[0] is Verdict.AMBIGUOUS
     assert verdicts[-1] in (Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER)
-    assert [(m.effect, m.joint) for m in found.missing] == [(name, "knee")]
+    assert [(m.effect, m.joint) for m in found.missing] == [(name, joint)]
 
 
 def test_a_stiffness_below_zero_predicts_no_deflection():
