@@ -130,7 +130,7 @@ def align_streams(
     lost = {}
     for name, time in times.items():
         allowed = how.longest_gap or GAP_FACTOR * float(np.median(np.diff(time)))
-        inside = _in_gap(grid, time, allowed)
+        inside = in_gap(grid, time, allowed)
         lost[name] = int(np.count_nonzero(inside))
         keep &= ~inside
     columns: dict[str, FloatArray] = {}
@@ -192,8 +192,8 @@ def _grid(times: Mapping[str, FloatArray], reference: str, rate: float | None, s
     return grid
 
 
-def _in_gap(grid: FloatArray, time: FloatArray, allowed: float) -> NDArray[np.bool_]:
-    """Which points lie strictly inside an interval longer than allowed."""
+def in_gap(grid: FloatArray, time: FloatArray, allowed: float) -> NDArray[np.bool_]:
+    """Which points of a grid (N,) [s] lie strictly inside an interval of `time` (M,) [s] longer than allowed [s]."""
     after = np.clip(np.searchsorted(time, grid, side="left"), 1, time.size - 1)
     long = time[after] - time[after - 1] > allowed
     return np.asarray(long & (grid > time[after - 1]) & (grid < time[after]))
