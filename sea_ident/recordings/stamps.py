@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
@@ -38,7 +37,7 @@ def even_stamps(time: FloatArray, interval: float, name: str) -> FloatArray:
         RecordingError: the stamps lie on no such grid.
     """
     places, start, exact = _grid(time, interval)
-    grid: FloatArray = start + exact * places
+    grid: FloatArray = np.asarray(start + exact * places, dtype=np.float64)
     falls = np.flatnonzero(np.diff(time) < 0.0)
     k = int(falls[0]) if falls.size else int(np.argmax(np.abs(time - grid)))
     if falls.size or abs(exact / interval - 1.0) > WITHIN or abs(time[k] - grid[k]) > FARTHEST * exact:
@@ -72,6 +71,8 @@ def _grid(time: FloatArray, interval: float) -> tuple[NDArray[np.int64], float, 
     Which interval it is that the clock of the stamps has is tried from several sides: one that is off by little makes
     the stamps drift off their places over a long log, which looks as if samples were lost.
     """
+    from scipy.optimize import isotonic_regression
+
     since, number = time - time[0], np.arange(len(time), dtype=np.float64)
     lag = min(LAG, len(time) - 1)
     tried = (interval, float(np.median(since[lag:] - since[:-lag])) / lag, float(since[-1]) / (len(time) - 1))
