@@ -72,7 +72,7 @@ def read_recording(
         columns: Column of the recording -> name in the file, or `ColumnSource` with its unit, gear and so on.
             One `*` on both sides stands for the same text: `{"q_*": ColumnSource("pos_*", unit="deg")}`. Columns
             of the file that bear a name of the project already need no entry.
-        clocks: How columns of different clocks or rates are brought together; by default by linear
+        clocks: How columns of different clocks or rates are brought together; by default by
             interpolation at the sample times of the first clock, where all of them have data.
         memory_limit: Refuse files whose contents take more than this [bytes].
 
