@@ -1,6 +1,7 @@
 """Wrong units, wrong columns and broken encoders are said before they spoil a model."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.processing import filter_recording, process
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.processing.plausible import beyond_limits, doubts
+from sea_ident.processing.torque import torque_source
 from sea_ident.recordings import Recording
 from sea_ident.robot import load_robot
 
@@ -187,3 +189,39 @@ def test_a_factor_that_nothing_explains_may_be_a_soft_spring(leg, recording, fac
     kinds = ("q", "theta", "tau_motor")
     (doubt,) = doubts(changed, leg, *(changed.channel(k, leg.joint_names) for k in kinds))
     assert doubt.kind is kind
+
+
+def test_a_sensor_that_wraps_around_is_told_with_its_span(leg, recording):
+    for scale, span in ((1.0, "6.283185307"), (180.0 / np.pi, "360"), (65536 / 2.0 / np.pi, "65536")):
+        turns = np.mod(scale * (recording.columns["q_hip"] + 6.0), float(span))
+        said = " ".join(found(leg, recording, q_hip=turns))
+        assert f"wraps_at={span}" in said
+
+
+def test_a_signal_that_was_held_between_slow_samples_is_told(leg, recording):
+    first = 7 * (np.arange(recording.samples) // 7)
+    for column in ("theta_hip", "tau_motor_knee"):
+        (said,) = found(leg, recording, **{column: recording.columns[column][first]})
+        assert "changes at every 7th sample only" in said
+        assert "14.29 Hz" in said
+    step = np.ptp(recording.columns["q_hip"]) / 200.0
+    assert found(leg, recording, q_hip=step * np.round(recording.columns["q_hip"] / step)) == []
+
+
+def test_a_joint_without_position_limits_is_known_by_its_speed(leg, recording):
+    n = leg.n
+    free = replace(leg, limits=replace(leg.limits, lower=np.full(n, -np.inf), upper=np.full(n, np.inf)))
+    assert found(free, recording) == []
+    said = found(free, recording, q_knee=180.0 / np.pi * recording.columns["q_knee"])
+    assert "is it in degrees? Then say ColumnSource('q_knee', unit='deg')" in said[0]
+    assert "another unit" in found(free, recording, q_knee=1e4 * recording.columns["q_knee"])[0]
+
+
+@pytest.mark.parametrize(("factor", "expected"), [(1.0, ""), (1.5, "is 1.5 times"), (-1.0, "does not run like")])
+def test_torque_and_current_of_a_joint_are_held_against_each_other(leg, recording, factor, expected):
+    motor = leg.joints[1].actuator
+    current = recording.columns["tau_motor_knee"] / (motor.gear_ratio * motor.torque_constant) / factor
+    both = recording.replace_columns({"current_knee": current})
+    said = [text for text in torque_source(both, leg).warnings if "tau_motor_knee" in text]
+    assert all(expected in text for text in said)
+    assert len(said) == bool(expected)

@@ -7,10 +7,16 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings import Recording
-from sea_ident.robot import Robot
+from sea_ident.robot import Joint, Robot
 
 SATURATED_SHARE = 0.005
 """Share of the samples at the very extreme of a current from which on it is called saturated."""
+
+SAME = 0.03
+"""Deviation of a measured torque from that by current without a word [-]."""
+
+ALIKE = 0.9
+"""Likeness of the two from which on there is a factor between them [-]."""
 
 COARSE = 50
 """Different values of a torque below which every top is flat, cut or not."""
@@ -57,6 +63,7 @@ def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
             values[:, i] = recording.channel("tau_motor", [joint.name])[:, 0]
             if recording.has("current", joint.name):
                 notes.append(f"{joint.name}: tau_motor_{joint.name} is used, current_{joint.name} is not")
+                warnings += _disagreement(recording, joint, values[:, i])
             kind = "tau_motor"
         elif recording.has("current", joint.name):
             actuator = joint.actuator
@@ -95,6 +102,28 @@ def transmitted(torque: FloatArray, efficiency: FloatArray, direction: FloatArra
     """
     sign = np.sign(torque * direction)
     return efficiency**sign
+
+
+def _disagreement(recording: Recording, joint: Joint, torque: FloatArray) -> list[str]:
+    """Whether a measured torque is not what the current gives, by more than losses of the transmission."""
+    actuator = joint.actuator
+    if actuator is None or actuator.torque_constant is None:
+        return []
+    by_current = actuator.gear_ratio * actuator.torque_constant * recording.channel("current", [joint.name])[:, 0]
+    power = float(by_current @ by_current)
+    if power == 0.0 or np.ptp(torque) == 0.0:
+        return []
+    factor = float(by_current @ torque) / power
+    lost = 1.0 if actuator.efficiency is None else actuator.efficiency
+    alike = factor * power**0.5 / float(torque @ torque) ** 0.5
+    if alike > ALIKE and lost * (1.0 - SAME) <= factor <= (1.0 + SAME) / lost:
+        return []
+    what = f"is {factor:.4g} times" if alike > ALIKE else f"does not run like (likeness {alike:.2f})"
+    return [
+        f"{recording.source}: tau_motor_{joint.name} {what} what current_{joint.name} gives by the torque constant "
+        f"{actuator.torque_constant:.4g} N m/A and the gear ratio {actuator.gear_ratio:g}. tau_motor_{joint.name} is "
+        "used: if the current is right, leave the torque out of the file; else correct what is described"
+    ]
 
 
 def _saturation(values: FloatArray, column: str, source: str) -> str:

@@ -251,8 +251,8 @@ def _check_time(time: FloatArray, source: str) -> None:
     if np.max(np.abs(time)) > LARGEST_VALUE:
         k = int(np.argmax(np.abs(time)))
         raise RecordingError(
-            f"{source}: time is {time[k]:g} s at sample {k}; if it is in nanoseconds, say "
-            "columns={'time': ColumnSource('time', unit='ns')}"
+            f"{source}: time is {time[k]:g} s at sample {k}, with a median interval of "
+            f"{float(np.median(np.diff(time))):g} s; {_clock(float(np.median(np.diff(time))))}"
         )
     falls = np.flatnonzero(np.diff(time) <= 0.0)
     if falls.size:
@@ -295,7 +295,9 @@ def _warnings(time: FloatArray, columns: Mapping[str, FloatArray], source: str) 
                 k = int(jumps[0])
                 found.append(
                     f"{source}: column {name} jumps by a whole turn after sample {k} (time {time[k]:g} s), and "
-                    f"{jumps.size} times in all; if the sensor wraps around, say ColumnSource(..., wraps_at=...)"
+                    f"{jumps.size} times in all; if the sensor wraps around, say where, in the unit of the file: "
+                    f"ColumnSource({name!r}, wraps_at=6.283185307), on the command line --column "
+                    f"'{name}={name},wraps_at=6.283185307'"
                 )
     unknown = [name for name in columns if split_name(name) is None]
     if unknown:
