@@ -36,8 +36,8 @@ def doubts_of_springs(robot: Robot, springs: Sequence[SpringResult]) -> list[str
 def other_scale(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
     """A sentence where all springs differ from the description in one direction: then it is the torque that does.
 
-    One that differs alone may be described wrong, unless it does by its gear ratio; nothing is said where a stiffness is
-    not described.
+    One that differs alone may be described wrong, unless it does by its gear ratio; nothing is said where a stiffness
+    is not described.
 
     Args:
         robot: the robot.

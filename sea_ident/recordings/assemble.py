@@ -10,7 +10,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings.alignment import ClockAlignment, Stream, align_streams
-from sea_ident.recordings.columns import ColumnSource, as_source, convert, describe
+from sea_ident.recordings.columns import ColumnSource, as_source, check_unit_in_name, convert, describe
 from sea_ident.recordings.naming import TIME, dimension_of
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import RawTable
@@ -55,6 +55,8 @@ def assemble(
     else:
         sources = _expand(columns, table, source)
         notes += [describe(target, how) for target, how in sources.items()]
+        for target, how in sources.items():
+            check_unit_in_name(target, how, source)
         used = {how.name for how in sources.values()} | _time_names(sources, table)
         for name in raw:
             if name not in used and name not in sources:

@@ -1,6 +1,7 @@
 """Translation of foreign columns into the project's: names, units, gear, encoder counts, signs and zeros."""
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -31,6 +32,7 @@ UNITS: Final[dict[str, dict[str, float]]] = {
 }
 """Physical dimension -> unit -> factor to SI (not a number where `counts_per_rev` decides)."""
 
+_UNIT_IN_NAME: Final = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
 _TEMPERATURE_ZEROS: Final = {"degC": 0.0, "K": 273.15, "degF": 32.0}
 
 
@@ -142,6 +144,36 @@ def convert(values: FloatArray, target: str, how: ColumnSource) -> FloatArray:
     factor *= how.scale * how.sign * _gear(target, dimension, how)
     converted: FloatArray = (raw - zero) * factor if zero != 0.0 else raw * factor
     return converted
+
+
+def check_unit_in_name(target: str, how: ColumnSource, source: str) -> None:
+    """Refuse a unit that is not the one which the name in the file ends with, as `Position (deg)` does.
+
+    Args:
+        target: Name of the column in the recording, or `time`.
+        how: The translation.
+        source: File name for messages.
+
+    Raises:
+        RecordingError: the two differ, and no scale explains it.
+    """
+    match = _UNIT_IN_NAME.search(how.name)
+    dimension = dimension_of(target)
+    if match is None or dimension is None or how.scale != 1.0:
+        return
+    spelled = match[1].strip().replace("²", "^2").replace("°", "deg").replace("µ", "u")
+    known = {name.replace(" ", "").lower(): name for name in UNITS[dimension]}
+    named = known.get(spelled.replace(" ", "").replace("*", "").replace("·", "").lower())
+    if named is None or named[:1].lower() != spelled[:1].lower():
+        return
+    stated = how.unit or ""
+    standard = SI_UNITS[dimension].split(" or ")
+    if named == stated or (named in standard and (how.unit is None or stated in standard)):
+        return
+    raise RecordingError(
+        f"{source}: column {how.name!r} says that it is in {match[1]}, and {target} is to be read from it in "
+        f"{how.unit or SI_UNITS[dimension]}: say unit={named}, or take the unit out of the name of the column"
+    )
 
 
 def describe(target: str, how: ColumnSource) -> str:

@@ -207,8 +207,23 @@ class Recording:
             f"{self.source}: joint {joint!r} needs column {name}, which is absent.{hint} "
             f"There are: time, {', '.join(self.columns) or 'nothing else'}. "
             f"A column with another name is translated by columns={{'{name}': <name in the file>}}, on the command "
-            f"line by --column {name}=<name in the file>."
+            f"line by --column {name}=<name in the file>.{self._without(name, joint)}"
         )
+
+    def _without(self, name: str, joint: str) -> str:
+        """What to do where there is no such column under another name either."""
+        own = {kind for kind, other in filter(None, map(split_name, self.columns)) if other == joint}
+        if not own:
+            return (
+                f" If {joint!r} was held still and not recorded, leave it out of the joints that move (joints, on the "
+                "command line --joints)."
+            )
+        if name.startswith("theta_") and "q" in own:
+            return (
+                " If there is no spring between its motor and its link, describe its transmission as "
+                "transmission_interface/SimpleTransmission; of an elastic joint both sides must be measured."
+            )
+        return ""
 
 
 def _own(values: object, name: str, source: str) -> FloatArray:

@@ -45,6 +45,14 @@ def test_absent_channel_names_joint_column_file_and_what_exists():
         assert part in message
 
 
+def test_an_absent_channel_says_what_to_do_without_it():
+    leg = recording(q_hip=TIME, current_hip=TIME)
+    with pytest.raises(RecordingError, match=r"'knee' was held still .* --joints"):
+        leg.channel("q", ["knee"])
+    with pytest.raises(RecordingError, match="describe its transmission as transmission_interface/SimpleTransmission"):
+        leg.channel("theta", ["hip"])
+
+
 @pytest.mark.parametrize(("kind", "joints", "part"), [("torque", ["hip"], "tau_motor"), ("q", "hip", "sequence")])
 def test_channel_refuses_unknown_kinds_and_bare_names(kind, joints, part):
     with pytest.raises(RecordingError, match=part):
