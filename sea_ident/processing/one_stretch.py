@@ -3,18 +3,23 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.motion import Motion
 from sea_ident.processing import filtering, torque, variance
 from sea_ident.processing.doubt import Doubt
+from sea_ident.processing.periods import usual_interval
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.processing.signals import Signals
 from sea_ident.recordings import Recording
-from sea_ident.recordings.alignment import in_gap
+from sea_ident.recordings.alignment import between, in_gap
 from sea_ident.recordings.recording import GAP_FACTOR
 from sea_ident.robot import Robot
+
+RUN = 64
+"""Samples without gaps at least that a spectrum is taken of."""
 
 FEWEST_SAMPLES = 16
 """Samples outside gaps at least."""
@@ -91,15 +96,19 @@ def not_periodic(
     time, lost = recording.time, np.zeros(recording.samples, dtype=np.bool_)
     values = {"q": signals.q, "theta": signals.theta, "torque": signals.torque.values, **signals.others}
     if not uniform:
-        grid = np.linspace(time[0], time[-1], len(time))
+        gap = GAP_FACTOR * float(np.median(np.diff(time)))
+        interval = usual_interval(time)
+        grid: FloatArray = time[0] + np.arange(int((time[-1] - time[0]) / interval) + 1) * interval
         values = {
-            name: np.stack([np.interp(grid, time, column) for column in table.T], axis=1)
+            name: np.stack(
+                [between(grid, time, column, gap if name in ("q", "theta") else None) for column in table.T], axis=1
+            )
             for name, table in values.items()
         }
-        time, lost = grid, in_gap(grid, time, GAP_FACTOR * float(np.median(np.diff(time))))
-        notes.append("samples are not evenly spaced: interpolated linearly to an even grid")
+        time, lost = grid, in_gap(grid, time, gap)
+        notes.append("samples are not evenly spaced: interpolated to an even grid, positions by cubic splines")
     positions = np.concatenate([values["q"], values["theta"][:, elastic]], axis=1)
-    frequency = cutoff or filtering.choose_cutoff(positions, interval)
+    frequency = cutoff or filtering.choose_cutoff(positions[_longest(lost)], interval)
     smooth = filtering.zero_phase(positions, interval, frequency, source)
     rate = filtering.central_difference(smooth, interval)
     acceleration = filtering.central_difference(rate, interval)
@@ -108,9 +117,9 @@ def not_periodic(
         "without periods there is no scatter to judge the torque noise by. If the motion repeats, give its period "
         "(--period on the command line); else record one that does, ten times or more"
     )
-    edge = min(int(np.ceil(1.0 / (frequency * interval))), recording.samples // 8)
-    inside = np.ones(recording.samples, dtype=np.bool_)
-    inside[:edge] = inside[recording.samples - edge :] = False
+    edge = min(int(np.ceil(1.0 / (frequency * interval))), len(time) // 8)
+    inside = np.ones(len(time), dtype=np.bool_)
+    inside[:edge] = inside[len(time) - edge :] = False
     if np.any(lost):
         reached = np.convolve(lost, np.ones(2 * edge + 1), mode="same") > 0.5
         found.append(
@@ -135,3 +144,13 @@ def not_periodic(
     tau = load * torque.transmitted(load, signals.torque.efficiency, motion.dtheta)
     channels = {name: values[name][inside] for name in signals.others}
     return one_stretch(source, robot, motion, tau, channels, notes, found, signals.doubts)
+
+
+def _longest(lost: NDArray[np.bool_]) -> slice:
+    """The longest run of samples without gaps: what is put into gaps has corners, which look like fast motion."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], lost, [True]]).astype(int)))
+    starts, stops = edges[::2], edges[1::2]
+    if not starts.size:
+        return slice(None)
+    best = int(np.argmax(stops - starts))
+    return slice(int(starts[best]), int(stops[best])) if stops[best] - starts[best] >= RUN else slice(None)

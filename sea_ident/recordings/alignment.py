@@ -151,7 +151,7 @@ def align_streams(
                 raise RecordingError(f"{source}: column {column} comes from two streams, the second being {name!r}")
             allowed = how.longest_gap or GAP_FACTOR * float(np.median(np.diff(times[name])))
             smooth = dimension_of(column) in SMOOTH
-            columns[column] = _between(grid[keep], times[name], values, allowed if smooth else None)
+            columns[column] = between(grid[keep], times[name], values, allowed if smooth else None)
     reports = tuple(
         StreamReport(
             name,
@@ -205,8 +205,15 @@ def _grid(times: Mapping[str, FloatArray], reference: str, rate: float | None, s
     return grid
 
 
-def _between(grid: FloatArray, time: FloatArray, values: FloatArray, allowed: float | None) -> FloatArray:
-    """Values at the points of a grid: by cubic splines between gaps longer than allowed [s], linearly where None."""
+def between(grid: FloatArray, time: FloatArray, values: FloatArray, allowed: float | None) -> FloatArray:
+    """Values (M,) at the points of a grid: by cubic splines between gaps longer than allowed [s], linearly where None.
+
+    Args:
+        grid: (M,) points inside the time of the samples [s].
+        time: (N,) of the samples [s].
+        values: (N,) of the samples.
+        allowed: longest interval that a spline goes across [s].
+    """
     found: FloatArray = np.interp(grid, time, values)
     if allowed is None or np.all(np.isin(grid, time)):
         return found
