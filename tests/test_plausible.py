@@ -225,3 +225,35 @@ def test_torque_and_current_of_a_joint_are_held_against_each_other(leg, recordin
     said = [text for text in torque_source(both, leg).warnings if "tau_motor_knee" in text]
     assert all(expected in text for text in said)
     assert len(said) == bool(expected)
+
+
+def test_counts_that_an_encoder_lost_show_in_the_deflection(leg, recording):
+    turn = 2.0 * np.pi / leg.joints[1].actuator.gear_ratio
+    values = recording.columns["theta_knee"].copy()
+    values[2345:] += turn
+    (said,) = found(leg, recording, theta_knee=values)
+    assert "theta_knee - q_knee jumps by 0.06277 rad" in said
+    assert "after sample 2344" in said
+    assert f"a turn of the motor is {turn:.4g} rad" in said
+
+
+def test_spikes_of_a_torque_are_counted_and_noise_is_none(leg, recording):
+    def said(torque):
+        changed = recording.replace_columns({"tau_motor_knee": torque})
+        return [text for text in torque_source(changed, leg).warnings if "spikes" in text]
+
+    rng = np.random.default_rng(0)
+    torque = recording.columns["tau_motor_knee"].copy()
+    assert said(torque) == []
+    assert said(torque + rng.normal(size=len(torque))) == []
+    assert said(np.round(torque)) == []
+    assert said(20.0 * np.sign(recording.columns["q_knee"] - np.mean(recording.columns["q_knee"]))) == []
+    torque[[500, 900, 1700]] += 60.0
+    (text,) = said(torque)
+    assert "tau_motor_knee has 3 spikes, the first at sample 500" in text
+
+
+def test_play_that_is_crossed_at_every_reversal_is_no_lost_count(leg, recording):
+    q, knee = recording.columns["q_knee"], recording.columns["theta_knee"]
+    play = 0.05 * np.sign(np.gradient(q))
+    assert not [text for text in found(leg, recording, theta_knee=knee + play) if "theta_knee - q_knee jumps" in text]

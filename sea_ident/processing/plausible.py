@@ -1,6 +1,7 @@
 """What no robot does, but a wrong unit, a wrong column or a broken encoder: said before anything is identified."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.processing.doubt import Doubt, DoubtKind
@@ -36,6 +37,9 @@ TURNS = (2.0 * np.pi, 360.0, 400.0, 1.0, 1000.0, *(2.0**bits for bits in range(8
 
 TURN_WITHIN = 0.03
 """Deviation from one of them up to which it is recognised: a motion goes on within the sample [-]."""
+
+MOST_SLIPS = 3
+"""Steps of a deflection up to which they are lost counts."""
 
 SPEED_SAMPLES = 10
 """Samples over which a speed is taken, so that noise of an encoder is none."""
@@ -87,6 +91,8 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
             partner = sensors[1 - k] if joint.elastic else None
             doubt(DoubtKind.SENSOR, _still(recording.time, name, values, joint, partner))
             doubt(DoubtKind.SENSOR, _jump(recording.time, name, values, joint))
+        if joint.elastic and not any(_jump(recording.time, name, values, joint) for name, values in sensors):
+            doubt(DoubtKind.SENSOR, _slip(recording.time, joint, theta[:, i] - q[:, i]))
         sensors.append((f"the torque of {joint.name}", torque[:, i]))
         for name, values in sensors:
             doubt(DoubtKind.SENSOR, _held(recording.time, name, values))
@@ -285,13 +291,33 @@ def _still(
     return []
 
 
-def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
-    """Whether a position makes steps that no motion makes."""
+def _jumps(time: FloatArray, values: FloatArray) -> NDArray[np.intp]:
+    """Samples before steps that no motion makes."""
     steps = np.diff(values)
     speed = np.abs(steps) / np.diff(time)
     usual = float(np.percentile(speed, 90.0))
-    jumps = np.flatnonzero((speed > FASTER * usual) & (np.abs(steps) > MOVED * np.ptp(values)))
-    if not jumps.size or usual == 0.0:
+    if usual == 0.0:
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero((speed > FASTER * usual) & (np.abs(steps) > MOVED * np.ptp(values)))
+
+
+def _slip(time: FloatArray, joint: Joint, deflection: FloatArray) -> list[str]:
+    """Whether a deflection makes a step that is too small to be seen in the positions, as lost counts make."""
+    column = f"theta_{joint.name} - q_{joint.name}"
+    told = _jump(time, column, deflection, joint)
+    # play of a gear is crossed at every reversal, counts are lost now and then
+    if _jumps(time, deflection).size > MOST_SLIPS:
+        return []
+    if not told or joint.actuator is None or joint.prismatic:
+        return told
+    turn = 2.0 * np.pi / abs(joint.actuator.gear_ratio)
+    return [f"{told[0]} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
+
+
+def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
+    """Whether a position makes steps that no motion makes."""
+    steps, jumps = np.diff(values), _jumps(time, values)
+    if not jumps.size:
         return []
     k = int(jumps[0])
     more = "" if jumps.size == 1 else f", and {jumps.size} times in all"

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
@@ -17,6 +18,12 @@ SAME = 0.03
 
 ALIKE = 0.9
 """Likeness of the two from which on there is a factor between them [-]."""
+
+SPIKE = 5.0
+"""Distance from the median of five samples, over that of 99 % of the samples, from which on one is a spike [-]."""
+
+FEWEST_FOR_SPIKES = 200
+"""Samples from which on spikes are looked for."""
 
 COARSE = 50
 """Different values of a torque below which every top is flat, cut or not."""
@@ -83,9 +90,8 @@ def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
                 f"There are: time, {', '.join(recording.columns)}"
             )
         columns.append(f"{kind}_{joint.name}")
-        text = _saturation(values[:, i], columns[-1], recording.source)
-        if text:
-            warnings.append(text)
+        warnings += filter(None, (_saturation(values[:, i], columns[-1], recording.source),))
+        warnings += _spikes(recording, values[:, i], columns[-1])
     return TorqueSource(values, tuple(columns), efficiency, tuple(notes), tuple(warnings))
 
 
@@ -123,6 +129,23 @@ def _disagreement(recording: Recording, joint: Joint, torque: FloatArray) -> lis
         f"{recording.source}: tau_motor_{joint.name} {what} what current_{joint.name} gives by the torque constant "
         f"{actuator.torque_constant:.4g} N m/A and the gear ratio {actuator.gear_ratio:g}. tau_motor_{joint.name} is "
         "used: if the current is right, leave the torque out of the file; else correct what is described"
+    ]
+
+
+def _spikes(recording: Recording, values: FloatArray, column: str) -> list[str]:
+    """Whether single samples of a torque are far from their neighbours: a few of them outweigh all others."""
+    if len(values) < FEWEST_FOR_SPIKES:
+        return []
+    beside = np.abs(values - median_filter(values, 5, mode="nearest"))
+    usual = max(float(np.percentile(beside, 99.0)), 1e-12 * float(np.ptp(values)))
+    spikes = np.flatnonzero(beside > max(SPIKE * usual, float(np.std(values))))
+    if not spikes.size:
+        return []
+    k = int(spikes[0])
+    return [
+        f"{recording.source}: column {column} has {spikes.size} spikes, the first at sample {k} (time "
+        f"{recording.time[k]:g} s), {beside[k] / usual:.3g} times as far from its neighbours as 99 % of the samples: "
+        "a few such samples outweigh the others. Look at the sensor and its wiring, or use the robust estimator"
     ]
 
 

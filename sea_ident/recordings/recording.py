@@ -274,12 +274,17 @@ def _check_time(time: FloatArray, source: str) -> None:
         k = int(falls[0])
         what = "repeats" if time[k + 1] == time[k] else "falls"
         equal = int(np.count_nonzero(np.diff(time) == 0.0))
+        why = "Put rows in order, or split a log that was restarted"
+        if equal == falls.size:
+            why = (
+                "Remove repeated rows, or write time with more digits; of samples that were taken evenly and stamped "
+                "coarsely say the interval (ColumnSource('time', interval=0.001), on the command line --column "
+                "'time=time,interval=0.001')"
+            )
         raise RecordingError(
             f"{source}: time {what} at sample {k + 1}: {float(time[k])!r} s, then {float(time[k + 1])!r} s. "
             f"It must rise strictly; {falls.size} of {time.size - 1} steps do not ({equal} repeat a time). "
-            "Remove repeated rows, write time with more digits, or split a log that was restarted; of samples that "
-            "were taken evenly and stamped coarsely say the interval (ColumnSource('time', interval=0.001), on the "
-            "command line --column 'time=time,interval=0.001')"
+            f"{why}"
         )
     interval = float(np.median(np.diff(time)))
     if interval < SHORTEST_INTERVAL:

@@ -82,6 +82,8 @@ def test_arrays_are_copied_and_read_only():
         ([0.0], ["at least 2"]),
         ([], ["at least 2"]),
         ([0.0, 1.7e18, 1.8e18], ["nanoseconds"]),
+        ([0.0, 0.1, 0.05], ["falls at sample 2", "split a log that was restarted"]),
+        ([0.0, 0.1, 0.1], ["repeats at sample 2", "interval=0.001"]),
         ([1.7e12, 1.7e12 + 2.0, 1.7e12 + 4.0], ["milliseconds", "--column time=time,unit=ms"]),
         ([1.7e15, 1.7e15 + 2e3, 1.7e15 + 4e3], ["microseconds", "--column time=time,unit=us"]),
         ([1.7e18, 1.7e18 + 2e6, 1.7e18 + 4e6], ["nanoseconds", "--column time=time,unit=ns"]),
