@@ -27,7 +27,8 @@ def other_zeros(observations: Observations, values: FloatArray, springs: Sequenc
     """
     doubted = [s for s in springs if s.zero == 0.0 and s.verdict is not Verdict.CIRCULAR and not s.terms]
     doubted = [s for s in doubted if s.doubt() is not None or s.stiffness < 0.0]
-    if not doubted:
+    # what follows from a wrong period or a column that is doubted is no fault of a zero
+    if not doubted or observations.processed.doubts:
         return []
     robot, processed = observations.robot, observations.processed
     torque = observations.spring_torque(observations.mean, processed.tau_motor, values)

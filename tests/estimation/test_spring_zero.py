@@ -27,3 +27,10 @@ def test_a_difference_of_zeros_is_told_with_its_size(leg, truth, zero):
 
 def test_equal_zeros_are_not_told_of(leg, truth):
     assert told(identify(leg, record(leg, truth, 8, **NOISE), period=10.0)) == []
+
+
+def test_nothing_is_said_of_zeros_where_the_period_is_wrong(leg, truth):
+    recording = record(leg, truth, 8, **NOISE)
+    moved = recording.replace_columns({"theta_knee": recording.columns["theta_knee"] + 0.3})
+    assert told(identify(leg, moved, period=10.0))
+    assert told(identify(leg, moved, period=7.3)) == []
