@@ -22,7 +22,7 @@ from sea_ident.estimation import identify
 from sea_ident.exceptions import RecordingError, SeaIdentError, SeaIdentWarning
 from sea_ident.recordings import ColumnSource, read_recording
 from sea_ident.recordings.columns import as_source
-from sea_ident.recordings.files import SUFFIXES
+from sea_ident.recordings.files import SUFFIXES, is_recording
 from sea_ident.robot import Robot, robot_from_text
 
 WATCH = 1.0
@@ -59,10 +59,12 @@ class Batch:
     Attributes:
         rows: one for every recording, by name.
         table: the table that was written.
+        left_out: files of the folder that are no recordings by their names.
     """
 
     rows: tuple[BatchRow, ...]
     table: Path
+    left_out: tuple[str, ...] = ()
 
     @property
     def failed(self) -> tuple[BatchRow, ...]:
@@ -77,6 +79,9 @@ class Batch:
             f"earlier run), {len(self.failed)} failed"
         ]
         lines.extend(f"  {row.recording}: {row.message}" for row in self.failed)
+        if self.left_out:
+            more = f" and {len(self.left_out) - 5} more" if len(self.left_out) > 5 else ""
+            lines.append(f"no recordings by their names: {', '.join(self.left_out[:5])}{more}")
         lines.append(f"table: {self.table}")
         return "\n".join(lines)
 
@@ -93,7 +98,13 @@ class Batch:
             }
             for row in self.rows
         ]
-        return {"recordings": len(rows), "failed": len(self.failed), "rows": rows, "table": str(self.table)}
+        return {
+            "recordings": len(rows),
+            "failed": len(self.failed),
+            "rows": rows,
+            "left_out": list(self.left_out),
+            "table": str(self.table),
+        }
 
 
 @dataclass(frozen=True)
@@ -112,9 +123,11 @@ class _Task:
     def fingerprint(self) -> str:
         """Changes with the contents of the recording, the robot, the settings and the version."""
         digest = hashlib.sha256()
-        with open(self.path, "rb") as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
+        path = Path(self.path)
+        for part in sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]:
+            with open(part, "rb") as file:
+                while block := file.read(1 << 20):
+                    digest.update(block)
         columns = {name: asdict(as_source(how)) for name, how in sorted((self.columns or {}).items())}
         settings = [self.urdf, self.annotation, self.joints, self.period, columns, sea_ident.__version__]
         digest.update(json.dumps(settings).encode())
@@ -163,8 +176,8 @@ def identify_batch(
     """
     if jobs == 0:
         raise SeaIdentError("jobs is 0; give at least 1, or -1 for one per core")
-    paths = _recordings(Path(folder))
     target = Path(folder) / "identified" if out is None else Path(out)
+    paths, others = _recordings(Path(folder), target / TABLE)
     try:
         for name in (MODELS, ROWS):
             (target / name).mkdir(parents=True, exist_ok=True)
@@ -179,7 +192,10 @@ def identify_batch(
     prints: dict[str, str] = {}
     for task in tasks:
         name = Path(task.path).name
-        prints[name] = task.fingerprint()
+        try:
+            prints[name] = task.fingerprint()
+        except OSError:
+            prints[name] = ""  # cannot be read: reading it says why, in its row
         kept = _kept(target, name, prints[name])
         if kept is not None:
             rows[name] = kept
@@ -193,16 +209,18 @@ def identify_batch(
             tell(len(rows), len(tasks), name)
     ordered = tuple(rows[path.name] for path in paths)
     _write_table(ordered, target / TABLE)
-    return Batch(ordered, target / TABLE)
+    return Batch(ordered, target / TABLE, others)
 
 
-def _recordings(folder: Path) -> list[Path]:
+def _recordings(folder: Path, table: Path) -> tuple[list[Path], tuple[str, ...]]:
+    """Recordings of a folder without the table of an earlier run, and the names of other files."""
     if not folder.is_dir():
         raise RecordingError(f"{folder}: no such folder")
-    found = sorted(p for p in folder.iterdir() if p.is_file() and p.suffix.lower() in SUFFIXES and p.name[0] != ".")
+    seen = sorted(p for p in folder.iterdir() if p.name[0] != "." and p.absolute() != table.absolute())
+    found = [p for p in seen if is_recording(p)]
     if not found:
         raise RecordingError(f"{folder}: holds no recording; known suffixes are {', '.join(SUFFIXES)}")
-    return found
+    return found, tuple(p.name for p in seen if not p.is_dir() and p not in found)
 
 
 def _outcomes(tasks: Sequence[_Task], jobs: int) -> Iterator[_Outcome]:
@@ -308,7 +326,10 @@ def table_values(model: Mapping[str, Any]) -> dict[str, float]:
 
 def _write_table(rows: Sequence[BatchRow], path: Path) -> None:
     columns = list(dict.fromkeys(key for row in rows for key in row.values))
-    with atomic_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+    with (
+        atomic_file(path) as temporary,
+        open(temporary, "w", newline="", encoding="utf-8", errors="backslashreplace") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(["recording", "status", "message", "warnings", *columns])
         for row in rows:

@@ -1,6 +1,7 @@
 """A folder of recordings: past bad ones, on after a kill, into one table."""
 
 import csv
+import gzip
 import json
 import os
 import signal
@@ -200,3 +201,34 @@ def test_a_folder_without_recordings_is_an_error(robot, tmp_path):
         identify_batch(robot, tmp_path)
     with pytest.raises(RecordingError, match="no such folder"):
         identify_batch(robot, tmp_path / "nowhere")
+
+
+def test_packed_files_and_bags_are_recordings_and_what_is_none_is_told(robot, tmp_path):
+    write_recording(recording(80.0, 0), tmp_path / "plain.csv")
+    (tmp_path / "packed.csv.gz").write_bytes(gzip.compress((tmp_path / "plain.csv").read_bytes()))
+    write_recording(recording(80.0, 0), tmp_path / "bag")
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "notes.txt").write_text("no recording")
+    result = identify_batch(robot, tmp_path, period=PERIOD, jobs=1)
+    assert [row.recording for row in result.rows] == ["bag", "packed.csv.gz", "plain.csv"]
+    assert not result.failed
+    assert result.left_out == ("notes.txt",)
+    assert "notes.txt" in result.summary()
+    again = identify_batch(robot, tmp_path, period=PERIOD, jobs=1)
+    assert all(row.resumed for row in again.rows)
+
+
+def test_the_table_of_an_earlier_run_is_no_recording(robot, tmp_path):
+    write_recording(recording(80.0, 0), tmp_path / "plain.csv")
+    for _ in range(2):
+        result = identify_batch(robot, tmp_path, tmp_path, period=PERIOD, jobs=1)
+        assert [row.recording for row in result.rows] == ["plain.csv"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are any bytes on Linux")
+def test_a_name_that_is_no_text_is_a_row_like_any_other(robot, tmp_path):
+    write_recording(recording(80.0, 0), tmp_path / "plain.csv")
+    (tmp_path / "plain.csv").rename(tmp_path / os.fsdecode(b"r\xff.csv"))
+    result = identify_batch(robot, tmp_path, period=PERIOD, jobs=1)
+    assert not result.failed
+    assert r"r\udcff.csv" in result.table.read_text(encoding="utf-8")

@@ -1,6 +1,7 @@
 """The command line, called as users and other programs call it: as a process of its own."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -335,3 +336,11 @@ def test_a_warning_is_told_once(capsys):
     output.emit({"warnings": ["the first"]}, "", as_json=True)
     output.tell_held()
     assert capsys.readouterr().err == "warning: the first\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are any bytes on Linux")
+def test_names_of_files_that_are_no_text_are_printed(tmp_path):
+    (tmp_path / os.fsdecode(b"r\xff.csv")).write_text("nothing\n")
+    done = call("batch", tmp_path, "--robot", "emps", "--jobs", 1)
+    assert done.returncode == 0, done.stderr
+    assert r"r\udcff.csv" in done.stdout

@@ -1,6 +1,7 @@
 """Wrong units, wrong columns and broken encoders are said before they spoil a model."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.processing import filter_recording, process
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.processing.plausible import beyond_limits, doubts
+from sea_ident.processing.torque import torque_source
 from sea_ident.recordings import Recording
 from sea_ident.robot import load_robot
 
@@ -187,3 +189,71 @@ def test_a_factor_that_nothing_explains_may_be_a_soft_spring(leg, recording, fac
     kinds = ("q", "theta", "tau_motor")
     (doubt,) = doubts(changed, leg, *(changed.channel(k, leg.joint_names) for k in kinds))
     assert doubt.kind is kind
+
+
+def test_a_sensor_that_wraps_around_is_told_with_its_span(leg, recording):
+    for scale, span in ((1.0, "6.283185307"), (180.0 / np.pi, "360"), (65536 / 2.0 / np.pi, "65536")):
+        turns = np.mod(scale * (recording.columns["q_hip"] + 6.0), float(span))
+        said = " ".join(found(leg, recording, q_hip=turns))
+        assert f"wraps_at={span}" in said
+
+
+def test_a_signal_that_was_held_between_slow_samples_is_told(leg, recording):
+    first = 7 * (np.arange(recording.samples) // 7)
+    for column in ("theta_hip", "tau_motor_knee"):
+        (said,) = found(leg, recording, **{column: recording.columns[column][first]})
+        assert "changes at every 7th sample only" in said
+        assert "14.29 Hz" in said
+    step = np.ptp(recording.columns["q_hip"]) / 200.0
+    assert found(leg, recording, q_hip=step * np.round(recording.columns["q_hip"] / step)) == []
+
+
+def test_a_joint_without_position_limits_is_known_by_its_speed(leg, recording):
+    n = leg.n
+    free = replace(leg, limits=replace(leg.limits, lower=np.full(n, -np.inf), upper=np.full(n, np.inf)))
+    assert found(free, recording) == []
+    said = found(free, recording, q_knee=180.0 / np.pi * recording.columns["q_knee"])
+    assert "is it in degrees? Then say ColumnSource('q_knee', unit='deg')" in said[0]
+    assert "another unit" in found(free, recording, q_knee=1e4 * recording.columns["q_knee"])[0]
+
+
+@pytest.mark.parametrize(("factor", "expected"), [(1.0, ""), (1.5, "is 1.5 times"), (-1.0, "does not run like")])
+def test_torque_and_current_of_a_joint_are_held_against_each_other(leg, recording, factor, expected):
+    motor = leg.joints[1].actuator
+    current = recording.columns["tau_motor_knee"] / (motor.gear_ratio * motor.torque_constant) / factor
+    both = recording.replace_columns({"current_knee": current})
+    said = [text for text in torque_source(both, leg).warnings if "tau_motor_knee" in text]
+    assert all(expected in text for text in said)
+    assert len(said) == bool(expected)
+
+
+def test_counts_that_an_encoder_lost_show_in_the_deflection(leg, recording):
+    turn = 2.0 * np.pi / leg.joints[1].actuator.gear_ratio
+    values = recording.columns["theta_knee"].copy()
+    values[2345:] += turn
+    (said,) = found(leg, recording, theta_knee=values)
+    assert "theta_knee - q_knee jumps by 0.06277 rad" in said
+    assert "after sample 2344" in said
+    assert f"a turn of the motor is {turn:.4g} rad" in said
+
+
+def test_spikes_of_a_torque_are_counted_and_noise_is_none(leg, recording):
+    def said(torque):
+        changed = recording.replace_columns({"tau_motor_knee": torque})
+        return [text for text in torque_source(changed, leg).warnings if "spikes" in text]
+
+    rng = np.random.default_rng(0)
+    torque = recording.columns["tau_motor_knee"].copy()
+    assert said(torque) == []
+    assert said(torque + rng.normal(size=len(torque))) == []
+    assert said(np.round(torque)) == []
+    assert said(20.0 * np.sign(recording.columns["q_knee"] - np.mean(recording.columns["q_knee"]))) == []
+    torque[[500, 900, 1700]] += 60.0
+    (text,) = said(torque)
+    assert "tau_motor_knee has 3 spikes, the first at sample 500" in text
+
+
+def test_play_that_is_crossed_at_every_reversal_is_no_lost_count(leg, recording):
+    q, knee = recording.columns["q_knee"], recording.columns["theta_knee"]
+    play = 0.05 * np.sign(np.gradient(q))
+    assert not [text for text in found(leg, recording, theta_knee=knee + play) if "theta_knee - q_knee jumps" in text]

@@ -1,5 +1,6 @@
 """The application: verbs, exit codes, and what happens on errors and Ctrl-C."""
 
+import io
 import os
 import signal
 import sys
@@ -61,6 +62,9 @@ def main() -> None:
     # The matrices are small: threads inside the linear algebra would wait for each other, not work.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # names of files need not be text in the encoding of the terminal
+        sys.stdout.reconfigure(errors="backslashreplace")
     warnings.simplefilter("once", SeaIdentWarning)
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     # A polite kill unwinds like Ctrl-C, so that temporary files are removed.

@@ -143,7 +143,7 @@ def _column_of(text: str) -> "tuple[str, ColumnSource]":
         key, _, value = (part.strip() for part in setting.partition("="))
         if key in ("unit", "time"):
             how[key] = value
-        elif key in ("zero", "scale", "sign", "gear_ratio", "counts_per_rev", "wraps_at"):
+        elif key in ("zero", "scale", "sign", "gear_ratio", "counts_per_rev", "wraps_at", "interval"):
             try:
                 how[key] = float(value)
             except ValueError:
@@ -151,7 +151,7 @@ def _column_of(text: str) -> "tuple[str, ColumnSource]":
         else:
             raise RecordingError(
                 f"--column {text}: the key {key!r} is not known; there are unit, zero, scale, sign, gear_ratio, "
-                "counts_per_rev, wraps_at, time"
+                "counts_per_rev, wraps_at, interval, time"
             )
     return name, ColumnSource(source, **how)
 

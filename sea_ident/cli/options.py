@@ -66,7 +66,7 @@ ForeignColumns: TypeAlias = Annotated[
         "--column",
         metavar="NAME=SOURCE[,KEY=VALUE]",
         help="Read column NAME (q_knee, ...) from SOURCE in the file; keys: unit, zero, scale, sign, gear_ratio, "
-        "counts_per_rev, wraps_at, time. One * on both sides stands for the same text. May be repeated.",
+        "counts_per_rev, wraps_at, interval, time. One * on both sides stands for the same text. May be repeated.",
     ),
 ]
 

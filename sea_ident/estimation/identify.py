@@ -14,6 +14,7 @@ from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.state import Side
+from sea_ident.estimation.described_friction import described_friction
 from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVariables, PerSampleWLS
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.misplaced import misplaced_columns
@@ -25,6 +26,7 @@ from sea_ident.estimation.separability import unseparated_friction
 from sea_ident.estimation.signs import check_signs
 from sea_ident.estimation.solve import condition_number, solve_weighted
 from sea_ident.estimation.spring_result import Verdict
+from sea_ident.estimation.spring_zero import other_zeros
 from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
 from sea_ident.estimation.update import updated
@@ -161,7 +163,8 @@ def identify_observed(
         springs = springs_from(observations, model.values, known, unknown_zero, in_springs)
         springs = steps.widened_springs(springs, model.values, known, unknown_zero, in_springs)
     model = replace(model, springs=springs)
-    found.extend(_doubts(model))
+    found.extend([*_doubts(model), *other_zeros(observations, model.values, springs)])
+    found.extend(described_friction(robot, chosen, springs))
     return _told(model, found, (*processed.notes, *estimate.notes)), observations, tuple(found[first:])
 
 

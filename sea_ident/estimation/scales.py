@@ -36,7 +36,8 @@ def doubts_of_springs(robot: Robot, springs: Sequence[SpringResult]) -> list[str
 def other_scale(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
     """A sentence where all springs differ from the description in one direction: then it is the torque that does.
 
-    One that differs alone may be described wrong; nothing is said where a stiffness is not described.
+    One that differs alone may be described wrong, unless it does by its gear ratio; nothing is said where a stiffness
+    is not described.
 
     Args:
         robot: the robot.
@@ -54,7 +55,11 @@ def other_scale(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
         found.append((ratio, f"{spring.joint} {spring.linear_stiffness:.3g}, described as {described.stiffness:.3g}"))
         by_gear.append(abs(ratio * abs(described.gear_ratio) - 1.0) < RECOGNISED)
     if not found or not (min(r for r, _ in found) > ANOTHER or max(r for r, _ in found) < 1.0 / ANOTHER):
-        return []
+        return [
+            _by_gear(spring.joint, text, abs(robot.spring(spring.joint).gear_ratio))
+            for spring, (_, text), alike in zip(springs, found, by_gear, strict=True)
+            if alike and abs(robot.spring(spring.joint).gear_ratio) > ANOTHER
+        ]
     if all(by_gear):
         why = "softer by the gear ratio: tau_motor is the torque at the joint, that of the motor times the ratio"
     else:
@@ -63,3 +68,13 @@ def other_scale(robot: Robot, springs: Sequence[SpringResult]) -> list[str]:
         f"no spring has the stiffness that is described ({'; '.join(text for _, text in found)}): {why}. "
         "Where it is the torque, bodies and friction are wrong by as much"
     ]
+
+
+def _by_gear(joint: str, text: str, gear: float) -> str:
+    """What to say of one spring that is softer than described by its gear ratio."""
+    column = f"tau_motor_{joint}"
+    return (
+        f"spring of {text}: softer by the gear ratio. Is {column} that of the motor before the gear? Then say "
+        f"ColumnSource({column!r}, gear_ratio={gear:g}), on the command line --column "
+        f"'{column}={column},gear_ratio={gear:g}'; what is identified of the joints that carry it is wrong with it"
+    )

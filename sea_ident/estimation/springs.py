@@ -195,8 +195,8 @@ def spring_columns(motion: Motion, joint: int, zero: float, effects: Sequence[Jo
     return np.column_stack([*law, *(effect.local_columns(q, dq, theta, dtheta) for effect in effects)])
 
 
-def _fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
-    """The difference of zeros for which the odd law fits best: Newton's steps on the offset."""
+def fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
+    """The difference of zeros [rad] or [m] for which the odd law fits a torque (N,) best: Newton's steps on it."""
     zero = float(np.mean(motion.deflection[:, joint]))
     for _ in range(50):
         columns = spring_columns(motion, joint, zero)
@@ -213,7 +213,7 @@ def _fit_zero(motion: Motion, joint: int, tau: FloatArray) -> float:
 
 def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
     name, joint, motion, tau = data.name, data.joint, data.motion, data.tau
-    zero = _fit_zero(motion, joint, tau) if unknown_zero else 0.0
+    zero = fit_zero(motion, joint, tau) if unknown_zero else 0.0
     whole = data.columns(motion, zero)
     columns, count = whole[:, :3], whole.shape[1]
     scale = np.linalg.norm(whole, axis=0)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from sea_ident._typing import FloatArray
@@ -23,6 +24,9 @@ FEWEST_DRIFTING = 5
 
 NOISE = 9.0
 """Mean square difference over that of the noise up to which noise explains it."""
+
+WHOLE = 0.01
+"""Deviation of a ratio from a whole number up to which it is one [-]."""
 
 GROWTH = 2.5
 """Growth of the mean square difference over more periods up to which it does not grow: what repeats nearly, as two
@@ -58,8 +62,12 @@ class Cut:
         return np.asarray(spline(np.minimum(self.start + steps, time[-1])), dtype=np.float64).reshape(shape)
 
 
-def mismatch(values: FloatArray) -> FloatArray:
+def mismatch(values: FloatArray, measured: NDArray[np.bool_] | None = None) -> FloatArray:
     """How badly a uniformly sampled signal (M, k) repeats itself after every lag.
+
+    Args:
+        values: (M, k) signals.
+        measured: (M,) samples that count; all where None. Others, as in a gap of time, are compared with nothing.
 
     Returns:
         (M - M // 4,) for lags 0, 1, ...: mean square difference over twice the variance; 1 for unrelated samples.
@@ -70,7 +78,9 @@ def mismatch(values: FloatArray) -> FloatArray:
     columns = [column - column.mean() for column in values.T]
     columns = [column / column.std() for column in columns if np.ptp(column) > 0.0]
     size = 1 << int(np.ceil(np.log2(2 * samples)))
-    count = samples - np.arange(lags)
+    count: FloatArray = samples - np.arange(lags, dtype=np.float64)
+    if measured is not None and not np.all(measured):
+        return _mismatch_of_some(columns, measured, lags, size)
     for column in columns:
         spectrum = np.fft.rfft(column, size)
         products = np.fft.irfft(np.abs(spectrum) ** 2, size)[:lags]
@@ -83,7 +93,24 @@ def mismatch(values: FloatArray) -> FloatArray:
     return np.maximum(total / len(columns), 0.0)
 
 
-def detect_period(time: FloatArray, values: FloatArray) -> float | None:
+def _mismatch_of_some(columns: list[FloatArray], measured: NDArray[np.bool_], lags: int, size: int) -> FloatArray:
+    """As `mismatch`, of pairs of samples that are both measured."""
+    if not columns:
+        return np.ones(lags)
+    mask = np.fft.rfft(measured.astype(np.float64), size)
+    count = np.round(np.fft.irfft(np.abs(mask) ** 2, size)[:lags])
+    total = np.zeros(lags)
+    for column in columns:
+        seen = np.where(measured, column, 0.0)
+        spectrum, squares = np.fft.rfft(seen, size), np.fft.rfft(seen**2, size)
+        cross = squares * mask.conj() + squares.conj() * mask - 2.0 * np.abs(spectrum) ** 2
+        total += np.fft.irfft(cross, size)[:lags]
+    compared = count > 0.5 * (len(measured) - np.arange(lags) - 2.0 * np.count_nonzero(~measured))
+    found: FloatArray = np.where(compared & (count > 0.0), total / (2.0 * np.maximum(count, 1.0) * len(columns)), 1.0)
+    return np.maximum(found, 0.0)
+
+
+def detect_period(time: FloatArray, values: FloatArray, measured: NDArray[np.bool_] | None = None) -> float | None:
     """The period of signals, if they repeat themselves beyond doubt.
 
     A smooth motion is always a little like itself some time later. It counts as periodic where repeats differ by no
@@ -94,6 +121,7 @@ def detect_period(time: FloatArray, values: FloatArray) -> float | None:
     Args:
         time: (M,) uniform times [s].
         values: (M, k) signals.
+        measured: (M,) samples that count; all where None.
 
     Returns:
         The smallest lag [s] after which all signals repeat, refined between samples over several periods; None where
@@ -102,14 +130,15 @@ def detect_period(time: FloatArray, values: FloatArray) -> float | None:
     interval = float((time[-1] - time[0]) / (len(time) - 1))
     thin = max(1, len(time) // 200_000)
     values, interval = values[::thin], interval * thin
+    measured = None if measured is None else measured[::thin]
     if not np.any(np.ptp(values, axis=0) > 0.0):
         return None
-    lag = _first_repeat(mismatch(values))
+    lag = _first_repeat(mismatch(values, measured))
     if lag is None:
         return None
     if len(values) >= 3 * lag:
-        values = values[lag:]
-    error, moving = mismatch(values), np.ptp(values, axis=0) > 0.0
+        values, measured = values[lag:], None if measured is None else measured[lag:]
+    error, moving = mismatch(values, measured), np.ptp(values, axis=0) > 0.0
     repeats = len(values) / lag
     last = max(int(repeats / 2.0), min(2, int(repeats - 0.5)), 1)
     period, differences = float(lag), []
@@ -143,7 +172,13 @@ def _first_repeat(error: FloatArray) -> int | None:
     found = [_minimum(error, int(lag)) for lag in minima]
     height = np.array([low for _, low in found])
     rise = error[minima - 1] + error[minima + 1] - 2.0 * error[minima]
-    return int(minima[height <= max(4.0 * float(height.min()), 1e-9) + 0.02 * rise][0])
+    lag = int(minima[height <= max(4.0 * float(height.min()), 1e-9) + 0.02 * rise][0])
+    if 3 * lag <= 4 * len(error) // 3:
+        return lag
+    # of what is hardly repeated chance makes one multiple of the period the best, where stamps of time wander
+    parts = minima[(height <= ALIKE) & (minima < lag)]
+    fits = [part for part in parts if abs(lag / part - round(lag / part)) < WHOLE]
+    return int(fits[0]) if fits else lag
 
 
 def _minimum(error: FloatArray, near: int) -> tuple[float, float]:
@@ -157,6 +192,14 @@ def _minimum(error: FloatArray, near: int) -> tuple[float, float]:
         return float(near), float(middle)
     shift = float(np.clip(0.5 * (left - right) / curvature, -0.5, 0.5))
     return near + shift, max(float(middle - 0.5 * curvature * shift**2), 0.0)
+
+
+def usual_interval(time: FloatArray) -> float:
+    """Interval of samples at `time` (M,) [s]: where some are lost the others lie on a grid that the mean misses."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    on_grid = np.mean(np.abs(steps - usual) < USUAL * usual) > 1.0 - USUAL
+    return usual if on_grid else float(time[-1] - time[0]) / (len(time) - 1)
 
 
 def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> Cut:
@@ -176,8 +219,9 @@ def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> 
     """
     if not (np.isfinite(period) and period > 0.0):
         raise RecordingError(f"{source}: the period is {period} s; it must be positive")
-    interval = float((time[-1] - time[0]) / (len(time) - 1))
-    length = interval * len(time)  # the last sample lasts as long as the others
+    duration = float(time[-1] - time[0])
+    interval = duration / (len(time) - 1) if uniform else usual_interval(time)
+    length = duration + interval  # the last sample lasts as long as the others
     periods = int(np.floor(length / period + 1e-6))
     if periods < 1:
         raise RecordingError(
@@ -199,6 +243,9 @@ def cut_periods(time: FloatArray, uniform: bool, period: float, source: str) -> 
         start = float(time[0])
     return Cut(period, samples, periods, -1, start)
 
+
+USUAL = 0.2
+"""Share of intervals that may differ from the usual one, and by which share of it, of samples on a grid."""
 
 DIES_AWAY = 0.5
 """Share of its distance from later periods that a transient has one period on, at most [-]."""

@@ -1,6 +1,7 @@
 """What no robot does, but a wrong unit, a wrong column or a broken encoder: said before anything is identified."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.processing.doubt import Doubt, DoubtKind
@@ -31,6 +32,27 @@ MOVED = 0.1
 HELD = 0.02
 """How far from where it is locked a joint may be [rad] or [m]: a brake gives that much."""
 
+TURNS = (2.0 * np.pi, 360.0, 400.0, 1.0, 1000.0, *(2.0**bits for bits in range(8, 33)))
+"""Spans after which encoders start again, in the units of files."""
+
+TURN_WITHIN = 0.03
+"""Deviation from one of them up to which it is recognised: a motion goes on within the sample [-]."""
+
+MOST_SLIPS = 3
+"""Steps of a deflection up to which they are lost counts."""
+
+SPEED_SAMPLES = 10
+"""Samples over which a speed is taken, so that noise of an encoder is none."""
+
+TOO_FAST = 8.0
+"""Usual speed over its limit from which on the unit is doubted."""
+
+FEWEST_CHANGES = 50
+"""Changes of a signal from which on their rhythm is looked at."""
+
+REGULAR = 0.9
+"""Share of changes equally far apart from which on a signal was held between samples; an encoder's depend on speed."""
+
 FASTER = 6.0
 """Speed over that of the faster tenth of the samples from which on a step is a jump."""
 
@@ -55,6 +77,8 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
 
     for i, joint in enumerate(robot.joints):
         doubt(DoubtKind.POSITION, _position(joint, robot.limits.lower[i], robot.limits.upper[i], q[:, i]))
+        if not np.isfinite(robot.limits.upper[i] - robot.limits.lower[i]):
+            doubt(DoubtKind.POSITION, _speed(recording.time, joint, robot.limits.velocity[i], q[:, i]))
         doubt(DoubtKind.TORQUE, _torque(recording, joint, robot.limits.torque[i], torque[:, i]))
         sensors = [(f"q_{joint.name}", q[:, i])]
         if joint.elastic:
@@ -67,6 +91,11 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
             partner = sensors[1 - k] if joint.elastic else None
             doubt(DoubtKind.SENSOR, _still(recording.time, name, values, joint, partner))
             doubt(DoubtKind.SENSOR, _jump(recording.time, name, values, joint))
+        if joint.elastic and not any(_jump(recording.time, name, values, joint) for name, values in sensors):
+            doubt(DoubtKind.SENSOR, _slip(recording.time, joint, theta[:, i] - q[:, i]))
+        sensors.append((f"the torque of {joint.name}", torque[:, i]))
+        for name, values in sensors:
+            doubt(DoubtKind.SENSOR, _held(recording.time, name, values))
     doubt(DoubtKind.POSITION, _not_held(recording, robot))
     return found
 
@@ -133,6 +162,40 @@ def _position(joint: Joint, lower: float, upper: float, q: FloatArray) -> list[s
         both = f", and the same for theta_{joint.name}" if joint.elastic else ""
         return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}{both}"]
     return [f"{where}: is it in another unit, such as counts of the encoder (unit=counts,counts_per_rev=...)?"]
+
+
+def _speed(time: FloatArray, joint: Joint, limit: float, q: FloatArray) -> list[str]:
+    """Whether a joint without limits of its position is so much faster than its limit that its unit must be another."""
+    if len(q) <= SPEED_SAMPLES:
+        return []
+    speeds = np.abs(q[SPEED_SAMPLES:] - q[:-SPEED_SAMPLES]) / (time[SPEED_SAMPLES:] - time[:-SPEED_SAMPLES])
+    usual = float(np.percentile(speeds, 90.0))
+    if not usual > TOO_FAST * limit:
+        return []
+    column, unit = f"q_{joint.name}", joint.position_unit
+    where = f"{column} moves at {usual:.4g} {unit}/s, its limit is {limit:.4g} {unit}/s"
+    factor, other, long = (0.001, "mm", "millimetres") if joint.prismatic else (np.pi / 180.0, "deg", "degrees")
+    if usual * factor <= 2.0 * limit:
+        both = f", and the same for theta_{joint.name}" if joint.elastic else ""
+        return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}{both}"]
+    return [f"{where}: is it in another unit, such as counts of the encoder, or is time?"]
+
+
+def _held(time: FloatArray, name: str, values: FloatArray) -> list[str]:
+    """Whether a signal was sampled at a lower rate, and each value held until the next."""
+    changes = np.flatnonzero(np.diff(values) != 0.0)
+    if changes.size < FEWEST_CHANGES:
+        return []
+    apart = np.diff(changes)
+    usual = int(np.median(apart))
+    if usual < 2 or np.mean(np.abs(apart - usual) <= (1 if usual >= 4 else 0)) < REGULAR:
+        return []
+    interval = float(np.median(np.diff(time)))
+    return [
+        f"{name} changes at every {usual}th sample only, each {1e3 * usual * interval:.3g} ms: it was sampled at "
+        f"{1.0 / (usual * interval):.4g} Hz and held, so that it is late by up to that. Give the samples that it has "
+        "with a time of their own (ColumnSource(..., time=...), in a format with columns of different length)"
+    ]
 
 
 def _torque(recording: Recording, joint: Joint, limit: float, torque: FloatArray) -> list[str]:
@@ -228,17 +291,40 @@ def _still(
     return []
 
 
-def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
-    """Whether a position makes steps that no motion makes."""
+def _jumps(time: FloatArray, values: FloatArray) -> NDArray[np.intp]:
+    """Samples before steps that no motion makes."""
     steps = np.diff(values)
     speed = np.abs(steps) / np.diff(time)
     usual = float(np.percentile(speed, 90.0))
-    jumps = np.flatnonzero((speed > FASTER * usual) & (np.abs(steps) > MOVED * np.ptp(values)))
-    if not jumps.size or usual == 0.0:
+    if usual == 0.0:
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero((speed > FASTER * usual) & (np.abs(steps) > MOVED * np.ptp(values)))
+
+
+def _slip(time: FloatArray, joint: Joint, deflection: FloatArray) -> list[str]:
+    """Whether a deflection makes a step that is too small to be seen in the positions, as lost counts make."""
+    column = f"theta_{joint.name} - q_{joint.name}"
+    told = _jump(time, column, deflection, joint)
+    # play of a gear is crossed at every reversal, counts are lost now and then
+    if _jumps(time, deflection).size > MOST_SLIPS:
+        return []
+    if not told or joint.actuator is None or joint.prismatic:
+        return told
+    turn = 2.0 * np.pi / abs(joint.actuator.gear_ratio)
+    return [f"{told[0]} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
+
+
+def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
+    """Whether a position makes steps that no motion makes."""
+    steps, jumps = np.diff(values), _jumps(time, values)
+    if not jumps.size:
         return []
     k = int(jumps[0])
     more = "" if jumps.size == 1 else f", and {jumps.size} times in all"
+    span = float(np.median(np.abs(steps[jumps])))
+    spans = [turn for turn in TURNS if abs(span / turn - 1.0) < TURN_WITHIN]
+    wraps = _say(name, f"wraps_at={spans[0]:.10g}") if jumps.size > 1 and spans else "say wraps_at=..."
     return [
         f"{name} jumps by {steps[k]:.4g} {joint.position_unit} after sample {k} (time {time[k]:g} s){more}: no motion "
-        "does that. Lost counts or a spike: leave out that part; a sensor that wraps around: say wraps_at=..."
+        f"does that. Lost counts or a spike: leave out that part; a sensor that wraps around: {wraps}"
     ]

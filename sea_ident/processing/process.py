@@ -1,7 +1,6 @@
 """`process`: from a recording to mean motion, derivatives, motor torque and its variance."""
 
 import warnings as python_warnings
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +10,15 @@ from sea_ident.arguments import expect, expect_number
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.one_thread import one_thread
-from sea_ident.processing import filtering, harmonics, periods, rest, torque, variance
+from sea_ident.processing import harmonics, periods, rest, torque, variance
 from sea_ident.processing.doubt import Doubt, DoubtKind
 from sea_ident.processing.encoder_steps import encoder_steps
+from sea_ident.processing.one_stretch import not_periodic, one_stretch
 from sea_ident.processing.processed import ProcessedRecording
 from sea_ident.processing.signals import Signals, read_signals
 from sea_ident.recordings import Recording
+from sea_ident.recordings.alignment import in_gap
+from sea_ident.recordings.recording import GAP_FACTOR
 from sea_ident.robot import Robot
 
 SMOOTHING = 0.5
@@ -63,7 +65,7 @@ def process(
     moving, signals, period = _in_motion(recording, robot, period)
     uniform = moving.is_uniform
     if period is None:
-        result = _not_periodic(moving, robot, signals, uniform, cutoff)
+        result = not_periodic(moving, robot, signals, uniform, cutoff)
     else:
         result = _periodic(moving, robot, signals, uniform, period, link_harmonics, motor_harmonics, smoothing)
     if moving is not recording:
@@ -88,7 +90,7 @@ def filter_recording(recording: Recording, robot: Robot, *, cutoff: float | None
     Raises:
         RecordingError: as `process`.
     """
-    result = _not_periodic(recording, robot, read_signals(recording, robot), recording.is_uniform, cutoff)
+    result = not_periodic(recording, robot, read_signals(recording, robot), recording.is_uniform, cutoff)
     for text in result.warnings:
         python_warnings.warn(text, SeaIdentWarning, stacklevel=3)
     return result
@@ -116,40 +118,7 @@ def from_states(
             f"{source}: motion of {motion.n} joints and torque of shape {tau_motor.shape} for {robot.name}, which has "
             f"{robot.n} joints"
         )
-    return _one_stretch(source, robot, motion, tau_motor, {})
-
-
-def _one_stretch(
-    source: str,
-    robot: Robot,
-    motion: Motion,
-    tau_motor: FloatArray,
-    channels: dict[str, FloatArray],
-    notes: Sequence[str] = (),
-    warnings: Sequence[str] = (),
-    doubts: Sequence[Doubt] = (),
-) -> ProcessedRecording:
-    """What was not averaged over periods; its torque noise is that of its fast part."""
-    spread = np.broadcast_to(variance.noise_from_curvature(tau_motor), tau_motor.shape)
-    return ProcessedRecording(
-        source=source,
-        joint_names=robot.joint_names,
-        motion=motion,
-        tau_motor=tau_motor,
-        tau_variance=spread,
-        raw_tau_variance=spread,
-        periods=1,
-        period=None,
-        period_motions=(),
-        period_tau_motor=tau_motor[None],
-        channels=channels,
-        places=(0,),
-        link_harmonics=0,
-        motor_harmonics=0,
-        notes=tuple(notes),
-        warnings=tuple(warnings),
-        doubts=tuple(doubts),
-    )
+    return one_stretch(source, robot, motion, tau_motor, {})
 
 
 def _in_motion(recording: Recording, robot: Robot, period: float | None) -> tuple[Recording, Signals, float | None]:
@@ -193,12 +162,14 @@ def _detected(recording: Recording, robot: Robot, signals: Signals, uniform: boo
     ]
     complete = all(any(recording.has(kind, name) for kind in kinds) for name in robot.joint_names)
     values = np.concatenate(reference, axis=1) if complete else signals.q
-    time = recording.time
+    time, measured = recording.time, None
     if not uniform:
-        grid = np.linspace(time[0], time[-1], len(time))
+        interval = periods.usual_interval(time)
+        grid = time[0] + np.arange(int((time[-1] - time[0]) / interval) + 1) * interval
         values = np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+        measured = ~in_gap(grid, time, GAP_FACTOR * float(np.median(np.diff(time))))
         time = grid
-    found = periods.detect_period(time, values)
+    found = periods.detect_period(time, values, measured)
     if found is not None:
         signals.notes.append(f"period {found:.6g} s found from the {'reference' if complete else 'link positions'}")
     return found
@@ -351,44 +322,3 @@ def _motions(
         for whole, part in zip(motor, found, strict=True):
             whole[:, :, elastic] = part
     return tuple(Motion(time, *(part[p] for part in (*link, *motor))) for p in range(len(q)))
-
-
-def _not_periodic(
-    recording: Recording, robot: Robot, signals: Signals, uniform: bool, cutoff: float | None
-) -> ProcessedRecording:
-    found, notes = list(signals.warnings), list(signals.notes)
-    source, elastic = recording.source, robot.elastic_indices
-    interval = recording.duration / (recording.samples - 1)
-    time = recording.time
-    values = {"q": signals.q, "theta": signals.theta, "torque": signals.torque.values, **signals.others}
-    if not uniform:
-        grid = np.linspace(time[0], time[-1], len(time))
-        values = {
-            name: np.stack([np.interp(grid, time, column) for column in table.T], axis=1)
-            for name, table in values.items()
-        }
-        time = grid
-        notes.append("samples are not evenly spaced: interpolated linearly to an even grid")
-    positions = np.concatenate([values["q"], values["theta"][:, elastic]], axis=1)
-    frequency = cutoff or filtering.choose_cutoff(positions, interval)
-    smooth = filtering.zero_phase(positions, interval, frequency, source)
-    rate = filtering.central_difference(smooth, interval)
-    acceleration = filtering.central_difference(rate, interval)
-    found.append(
-        f"{source}: no period: positions filtered forwards and backwards at {frequency:.3g} Hz and differentiated; "
-        "without periods there is no scatter to judge the torque noise by. If the motion repeats, give its period "
-        "(--period on the command line); else record one that does, ten times or more"
-    )
-    edge = min(int(np.ceil(1.0 / (frequency * interval))), recording.samples // 8)
-    inside = slice(edge, recording.samples - edge)
-    notes.append(f"{edge} samples at both ends were left out, where the filter has no data on one side")
-    parts = []
-    for table in (smooth, rate, acceleration):
-        motor = table[:, : robot.n].copy()
-        motor[:, elastic] = table[:, robot.n :]
-        parts.append((table[inside, : robot.n].copy(), motor[inside]))
-    motion = Motion(time[inside], *(p[0] for p in parts), *(p[1] for p in parts))
-    load = values["torque"][inside]
-    tau = load * torque.transmitted(load, signals.torque.efficiency, motion.dtheta)
-    channels = {name: values[name][inside] for name in signals.others}
-    return _one_stretch(source, robot, motion, tau, channels, notes, found, signals.doubts)

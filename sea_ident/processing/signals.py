@@ -8,6 +8,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.processing import torque
 from sea_ident.processing.doubt import Doubt
+from sea_ident.processing.late_stamps import late_stamps
 from sea_ident.processing.plausible import beyond_limits, doubts, unused
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -87,6 +88,7 @@ def read_signals(recording: Recording, robot: Robot) -> Signals:
             "was measured that a model could explain. Are the columns the right ones?"
         )
     found.extend(source.warnings)
+    found.extend(late_stamps(recording, np.concatenate([q, theta[:, robot.elastic_indices]], axis=1)))
     doubted = doubts(recording, robot, q, theta, source.values)
     found.extend(doubt.text for doubt in doubted)
     notes.extend(source.notes)

@@ -3,14 +3,27 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings import Recording
-from sea_ident.robot import Robot
+from sea_ident.robot import Joint, Robot
 
 SATURATED_SHARE = 0.005
 """Share of the samples at the very extreme of a current from which on it is called saturated."""
+
+SAME = 0.03
+"""Deviation of a measured torque from that by current without a word [-]."""
+
+ALIKE = 0.9
+"""Likeness of the two from which on there is a factor between them [-]."""
+
+SPIKE = 5.0
+"""Distance from the median of five samples, over that of 99 % of the samples, from which on one is a spike [-]."""
+
+FEWEST_FOR_SPIKES = 200
+"""Samples from which on spikes are looked for."""
 
 COARSE = 50
 """Different values of a torque below which every top is flat, cut or not."""
@@ -57,6 +70,7 @@ def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
             values[:, i] = recording.channel("tau_motor", [joint.name])[:, 0]
             if recording.has("current", joint.name):
                 notes.append(f"{joint.name}: tau_motor_{joint.name} is used, current_{joint.name} is not")
+                warnings += _disagreement(recording, joint, values[:, i])
             kind = "tau_motor"
         elif recording.has("current", joint.name):
             actuator = joint.actuator
@@ -76,9 +90,8 @@ def torque_source(recording: Recording, robot: Robot) -> TorqueSource:
                 f"There are: time, {', '.join(recording.columns)}"
             )
         columns.append(f"{kind}_{joint.name}")
-        text = _saturation(values[:, i], columns[-1], recording.source)
-        if text:
-            warnings.append(text)
+        warnings += filter(None, (_saturation(values[:, i], columns[-1], recording.source),))
+        warnings += _spikes(recording, values[:, i], columns[-1])
     return TorqueSource(values, tuple(columns), efficiency, tuple(notes), tuple(warnings))
 
 
@@ -95,6 +108,45 @@ def transmitted(torque: FloatArray, efficiency: FloatArray, direction: FloatArra
     """
     sign = np.sign(torque * direction)
     return efficiency**sign
+
+
+def _disagreement(recording: Recording, joint: Joint, torque: FloatArray) -> list[str]:
+    """Whether a measured torque is not what the current gives, by more than losses of the transmission."""
+    actuator = joint.actuator
+    if actuator is None or actuator.torque_constant is None:
+        return []
+    by_current = actuator.gear_ratio * actuator.torque_constant * recording.channel("current", [joint.name])[:, 0]
+    power = float(by_current @ by_current)
+    if power == 0.0 or np.ptp(torque) == 0.0:
+        return []
+    factor = float(by_current @ torque) / power
+    lost = 1.0 if actuator.efficiency is None else actuator.efficiency
+    alike = factor * power**0.5 / float(torque @ torque) ** 0.5
+    if alike > ALIKE and lost * (1.0 - SAME) <= factor <= (1.0 + SAME) / lost:
+        return []
+    what = f"is {factor:.4g} times" if alike > ALIKE else f"does not run like (likeness {alike:.2f})"
+    return [
+        f"{recording.source}: tau_motor_{joint.name} {what} what current_{joint.name} gives by the torque constant "
+        f"{actuator.torque_constant:.4g} N m/A and the gear ratio {actuator.gear_ratio:g}. tau_motor_{joint.name} is "
+        "used: if the current is right, leave the torque out of the file; else correct what is described"
+    ]
+
+
+def _spikes(recording: Recording, values: FloatArray, column: str) -> list[str]:
+    """Whether single samples of a torque are far from their neighbours: a few of them outweigh all others."""
+    if len(values) < FEWEST_FOR_SPIKES:
+        return []
+    beside = np.abs(values - median_filter(values, 5, mode="nearest"))
+    usual = max(float(np.percentile(beside, 99.0)), 1e-12 * float(np.ptp(values)))
+    spikes = np.flatnonzero(beside > max(SPIKE * usual, float(np.std(values))))
+    if not spikes.size:
+        return []
+    k = int(spikes[0])
+    return [
+        f"{recording.source}: column {column} has {spikes.size} spikes, the first at sample {k} (time "
+        f"{recording.time[k]:g} s), {beside[k] / usual:.3g} times as far from its neighbours as 99 % of the samples: "
+        "a few such samples outweigh the others. Look at the sensor and its wiring, or use the robust estimator"
+    ]
 
 
 def _saturation(values: FloatArray, column: str, source: str) -> str:

@@ -9,10 +9,18 @@ from numpy.typing import NDArray
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings.clock_offset import estimate_offset
+from sea_ident.recordings.naming import dimension_of
 from sea_ident.recordings.recording import GAP_FACTOR, Recording
 
 MOST_SAMPLES = 100_000_000
 """Samples of a grid."""
+
+
+SMOOTH = ("position", "velocity")
+"""Physical dimensions of signals that have no jumps."""
+
+FEWEST_FOR_SPLINE = 8
+"""Samples between gaps from which on they are joined by a spline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +106,10 @@ def align_streams(
     *,
     source: str = "streams",
 ) -> AlignedRecording:
-    """Interpolate streams linearly onto one grid, inside the window that all cover; nothing is extrapolated.
+    """Interpolate streams onto one grid, inside the window that all cover; nothing is extrapolated.
+
+    Positions and velocities are interpolated by cubic splines between gaps: straight lines between the samples of a
+    slow clock have accelerations that no robot has. Other signals may jump, and are interpolated linearly.
 
     Args:
         streams: The signals by clock.
@@ -130,7 +141,7 @@ def align_streams(
     lost = {}
     for name, time in times.items():
         allowed = how.longest_gap or GAP_FACTOR * float(np.median(np.diff(time)))
-        inside = _in_gap(grid, time, allowed)
+        inside = in_gap(grid, time, allowed)
         lost[name] = int(np.count_nonzero(inside))
         keep &= ~inside
     columns: dict[str, FloatArray] = {}
@@ -138,7 +149,9 @@ def align_streams(
         for column, values in recording.columns.items():
             if column in columns:
                 raise RecordingError(f"{source}: column {column} comes from two streams, the second being {name!r}")
-            columns[column] = np.interp(grid[keep], times[name], values)
+            allowed = how.longest_gap or GAP_FACTOR * float(np.median(np.diff(times[name])))
+            smooth = dimension_of(column) in SMOOTH
+            columns[column] = between(grid[keep], times[name], values, allowed if smooth else None)
     reports = tuple(
         StreamReport(
             name,
@@ -192,8 +205,31 @@ def _grid(times: Mapping[str, FloatArray], reference: str, rate: float | None, s
     return grid
 
 
-def _in_gap(grid: FloatArray, time: FloatArray, allowed: float) -> NDArray[np.bool_]:
-    """Which points lie strictly inside an interval longer than allowed."""
+def between(grid: FloatArray, time: FloatArray, values: FloatArray, allowed: float | None) -> FloatArray:
+    """Values (M,) at the points of a grid: by cubic splines between gaps longer than allowed [s], linearly where None.
+
+    Args:
+        grid: (M,) points inside the time of the samples [s].
+        time: (N,) of the samples [s].
+        values: (N,) of the samples.
+        allowed: longest interval that a spline goes across [s].
+    """
+    found: FloatArray = np.interp(grid, time, values)
+    if allowed is None or np.all(np.isin(grid, time)):
+        return found
+    from scipy.interpolate import make_interp_spline
+
+    stops = [*(np.flatnonzero(np.diff(time) > allowed) + 1).tolist(), len(time)]
+    for start, stop in zip([0, *stops[:-1]], stops, strict=True):
+        first, last = np.searchsorted(grid, [time[start], time[stop - 1]], side="left")
+        if stop - start >= FEWEST_FOR_SPLINE and last > first:
+            spline = make_interp_spline(time[start:stop], values[start:stop], k=3)
+            found[first:last] = spline(grid[first:last])
+    return found
+
+
+def in_gap(grid: FloatArray, time: FloatArray, allowed: float) -> NDArray[np.bool_]:
+    """Which points of a grid (N,) [s] lie strictly inside an interval of `time` (M,) [s] longer than allowed [s]."""
     after = np.clip(np.searchsorted(time, grid, side="left"), 1, time.size - 1)
     long = time[after] - time[after - 1] > allowed
     return np.asarray(long & (grid > time[after - 1]) & (grid < time[after]))

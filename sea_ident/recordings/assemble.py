@@ -10,7 +10,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings.alignment import ClockAlignment, Stream, align_streams
-from sea_ident.recordings.columns import ColumnSource, as_source, convert, describe
+from sea_ident.recordings.columns import ColumnSource, as_source, check_unit_in_name, convert, describe
 from sea_ident.recordings.naming import TIME, dimension_of
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import RawTable
@@ -26,8 +26,9 @@ def assemble(
 ) -> Recording:
     """Build a recording from the columns of a file.
 
-    Without a translation every column is taken as it is. With one, the translated columns come first, then
-    those of the file that bear a name of the project already and are not used by the translation; the others
+    Without a translation every column is taken as it is, but for those that bear no name of the project and hold NaN
+    or another number of samples than time, which are left out and noted. With one, the translated columns come first,
+    then those of the file that bear a name of the project already and are not used by the translation; the others
     are left out and noted.
 
     Args:
@@ -47,10 +48,15 @@ def assemble(
     left_out = list(table.left_out)
     sources: dict[str, ColumnSource] = {}
     if columns is None:
-        sources = {name: ColumnSource(name) for name in raw if name not in set(table.clocks.values())}
+        useless = _useless(table)
+        left_out += useless.values()
+        unused = {*table.clocks.values(), *useless}
+        sources = {name: ColumnSource(name) for name in raw if name not in unused}
     else:
         sources = _expand(columns, table, source)
         notes += [describe(target, how) for target, how in sources.items()]
+        for target, how in sources.items():
+            check_unit_in_name(target, how, source)
         used = {how.name for how in sources.values()} | _time_names(sources, table)
         for name in raw:
             if name not in used and name not in sources:
@@ -69,6 +75,21 @@ def assemble(
         return Recording(first.time, together, source, notes=tuple(notes))
     aligned = align_streams(streams, clocks, source=source).recording
     return replace(aligned, notes=(*notes, *aligned.notes))
+
+
+def _useless(table: RawTable) -> dict[str, str]:
+    """Columns that bear no name of the project and cannot be columns of a recording, with what to note of them."""
+    found = {}
+    for name, values in table.columns.items():
+        if dimension_of(name) is not None or name in table.clocks.values():
+            continue
+        clock = table.columns.get(table.clocks.get(name, TIME))
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            found[name] = f"{name} ({values[bad[0]]} at sample {bad[0]}, and {bad.size} times in all)"
+        elif clock is not None and len(clock) != len(values):
+            found[name] = f"{name} ({len(values)} values, where time has {len(clock)})"
+    return found
 
 
 def _expand(columns: Mapping[str, ColumnSource], table: RawTable, source: str) -> dict[str, ColumnSource]:

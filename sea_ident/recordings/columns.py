@@ -1,6 +1,7 @@
 """Translation of foreign columns into the project's: names, units, gear, encoder counts, signs and zeros."""
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -9,6 +10,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings.naming import DIMENSIONS, SI_UNITS, dimension_of
+from sea_ident.recordings.stamps import even_stamps
 
 _TURN: Final = 2.0 * math.pi
 _ANGLES: Final = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "rev": _TURN}
@@ -30,6 +32,7 @@ UNITS: Final[dict[str, dict[str, float]]] = {
 }
 """Physical dimension -> unit -> factor to SI (not a number where `counts_per_rev` decides)."""
 
+_UNIT_IN_NAME: Final = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
 _TEMPERATURE_ZEROS: Final = {"degC": 0.0, "K": 273.15, "degF": 32.0}
 
 
@@ -51,6 +54,8 @@ class ColumnSource:
         counts_per_rev: Encoder counts per turn, with the unit `counts` or `counts/s`.
         wraps_at: Span [file unit] after which the reading starts again (360 for degrees, 65536 for a 16-bit
             counter); steps of more than half of it are then taken as a wrap and undone.
+        interval: For a column of time: samples were taken evenly, this far apart [file unit], and stamped late. Stamps
+            are moved to the even grid that is closest to them; samples that were lost leave their places empty.
         time: Time column of this signal, where it has another clock than the rest; with its unit as a
             `ColumnSource`.
 
@@ -66,6 +71,7 @@ class ColumnSource:
     gear_ratio: float = 1.0
     counts_per_rev: float | None = None
     wraps_at: float | None = None
+    interval: float | None = None
     time: "str | ColumnSource | None" = None
 
     def __post_init__(self) -> None:
@@ -77,7 +83,7 @@ class ColumnSource:
                     if field != "zero"
                     else f"ColumnSource({self.name!r}): zero is {value}; it must be finite"
                 )
-        for field in ("counts_per_rev", "wraps_at"):
+        for field in ("counts_per_rev", "wraps_at", "interval"):
             value = getattr(self, field)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise RecordingError(f"ColumnSource({self.name!r}): {field} is {value}; it must be positive")
@@ -129,10 +135,45 @@ def convert(values: FloatArray, target: str, how: ColumnSource) -> FloatArray:
     raw = values
     if how.wraps_at is not None and np.all(np.isfinite(values)):
         raw = np.unwrap(values, period=how.wraps_at)
+    if how.interval is not None:
+        if dimension != "time":
+            raise RecordingError(f"columns: {target} from {how.name!r} has an interval, which goes with time only")
+        if np.all(np.isfinite(values)) and len(values) > 1:
+            raw = even_stamps(values, how.interval, how.name)
     zero = how.zero + (_TEMPERATURE_ZEROS[how.unit or "degC"] if dimension == "temperature" else 0.0)
     factor *= how.scale * how.sign * _gear(target, dimension, how)
     converted: FloatArray = (raw - zero) * factor if zero != 0.0 else raw * factor
     return converted
+
+
+def check_unit_in_name(target: str, how: ColumnSource, source: str) -> None:
+    """Refuse a unit that is not the one which the name in the file ends with, as `Position (deg)` does.
+
+    Args:
+        target: Name of the column in the recording, or `time`.
+        how: The translation.
+        source: File name for messages.
+
+    Raises:
+        RecordingError: the two differ, and no scale explains it.
+    """
+    match = _UNIT_IN_NAME.search(how.name)
+    dimension = dimension_of(target)
+    if match is None or dimension is None or how.scale != 1.0:
+        return
+    spelled = match[1].strip().replace("²", "^2").replace("°", "deg").replace("µ", "u")
+    known = {name.replace(" ", "").lower(): name for name in UNITS[dimension]}
+    named = known.get(spelled.replace(" ", "").replace("*", "").replace("·", "").lower())
+    if named is None or named[:1].lower() != spelled[:1].lower():
+        return
+    stated = how.unit or ""
+    standard = SI_UNITS[dimension].split(" or ")
+    if named == stated or (named in standard and (how.unit is None or stated in standard)):
+        return
+    raise RecordingError(
+        f"{source}: column {how.name!r} says that it is in {match[1]}, and {target} is to be read from it in "
+        f"{how.unit or SI_UNITS[dimension]}: say unit={named}, or take the unit out of the name of the column"
+    )
 
 
 def describe(target: str, how: ColumnSource) -> str:
@@ -144,6 +185,8 @@ def describe(target: str, how: ColumnSource) -> str:
         parts.append(f"{how.counts_per_rev:g} counts per turn")
     if how.wraps_at is not None:
         parts.append(f"wraps at {how.wraps_at:g} undone")
+    if how.interval is not None:
+        parts.append(f"stamps put on an even grid of {how.interval:g}")
     if how.zero != 0.0:
         parts.append(f"zero at {how.zero:g}")
     if how.scale != 1.0 or how.sign != 1:

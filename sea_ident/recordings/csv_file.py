@@ -3,6 +3,7 @@
 import csv
 import gzip
 import io
+import re
 import zlib
 from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager, suppress
@@ -14,13 +15,17 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
-from sea_ident.recordings.naming import TIME
+from sea_ident.recordings.naming import TIME, dimension_of
 from sea_ident.recordings.recording import Recording
 from sea_ident.recordings.table import MOST_COLUMNS, RawTable, check_size, is_wanted
 
 LONGEST_HEADER = 1_000_000
 """Characters in the header row."""
 
+MISSING = frozenset(["na", "n/a", "null", "none", "nil", "missing", "-", "--", "?"])
+"""What programs write for a number that they do not have."""
+
+_DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}:\d{2}")
 _ROWS_AT_ONCE = 8192
 _COPIES = 3
 
@@ -29,7 +34,7 @@ def read_csv(path: Path, names: Collection[str] | None, memory_limit: int) -> Ra
     """Read the columns of a CSV file.
 
     A byte-order mark, CRLF line ends, blank lines, quotes and lines that start with # before the header are
-    fine.
+    fine. Columns of text or with empty cells that bear no name of the project are left out.
 
     Args:
         path: The file.
@@ -76,6 +81,13 @@ def _table(
     if not body:
         raise RecordingError(f"{path}: a header, but no rows of numbers")
     table = None
+    left_out = {i: name for i, name in enumerate(header) if i not in wanted}
+    optional = {i for i in wanted if names is None and dimension_of(header[i]) is None}
+    first = [cell.strip() for cell in body[: body.find("\n") if "\n" in body else None].split(",")]
+    for i in sorted(optional):
+        if len(first) == len(header) and not _is_number(first[i]):
+            left_out[i] = _no_numbers(header[i], first[i], first_line)
+            wanted.remove(i)
     if '"' not in body and _rectangular(body, len(header)):
         with suppress(ValueError), opened() as file:
             table = np.loadtxt(
@@ -87,9 +99,15 @@ def _table(
                 usecols=None if len(wanted) == len(header) else wanted,
             )
     if table is None:
-        table = _parse_slowly(body, header, wanted, first_line, path)
-    columns = {header[i]: table[:, k] for k, i in enumerate(wanted)}
-    return RawTable(columns, left_out=tuple(name for name in header if name not in columns))
+        table, texts = _parse_slowly(body, header, wanted, optional, first_line, path)
+        left_out |= texts
+    columns = {header[i]: table[:, k] for k, i in enumerate(wanted) if i not in left_out}
+    return RawTable(columns, left_out=tuple(left_out[i] for i in sorted(left_out)))
+
+
+def _no_numbers(name: str, cell: str, line: int) -> str:
+    """What to note of a column that is left out."""
+    return f"{name} ({'is empty' if not cell else f'holds {cell[:30]!r}'} in line {line})"
 
 
 def write_csv(recording: Recording, path: Path) -> None:
@@ -127,7 +145,7 @@ def _decode(data: bytes, path: Path) -> str:
 
 def _header(text: str, path: Path) -> tuple[list[str], int, int]:
     """Column names, where the rows start, and the number of the line after the header."""
-    start, line = 0, 1
+    start, line, above = 0, 1, ""
     while True:
         end = text.find("\n", start)
         end = len(text) if end < 0 else end
@@ -136,18 +154,18 @@ def _header(text: str, path: Path) -> tuple[list[str], int, int]:
             break
         if end == len(text):
             raise RecordingError(f"{path}: no header row with column names")
-        start, line = end + 1, line + 1
+        start, line, above = end + 1, line + 1, row or above
     if len(row) > LONGEST_HEADER:
         raise RecordingError(f"{path}, line {line}: a header row of {len(row)} characters; is it a CSV file?")
     try:
         header = [name.strip() for name in next(csv.reader([row], strict=True))]
     except csv.Error as error:
         raise RecordingError(f"{path}, line {line}: the header row cannot be read: {error}") from error
-    _check_header(header, row, line, path)
+    _check_header(header, row, above, line, path)
     return header, min(end + 1, len(text)), line + 1
 
 
-def _check_header(header: list[str], row: str, line: int, path: Path) -> None:
+def _check_header(header: list[str], row: str, above: str, line: int, path: Path) -> None:
     where = f"{path}, line {line}"
     if len(header) == 1:
         for delimiter, name in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
@@ -159,13 +177,26 @@ def _check_header(header: list[str], row: str, line: int, path: Path) -> None:
     if len(header) > MOST_COLUMNS:
         raise RecordingError(f"{where}: {len(header)} columns; at most {MOST_COLUMNS} are read")
     if all(_is_number(name) for name in header):
+        if above.count(",") == len(header) - 1:
+            raise RecordingError(
+                f"{where}: numbers instead of column names; the line above it looks like the header, but starts with "
+                "#, as comments do: take the # away"
+            )
         raise RecordingError(f"{where}: numbers instead of column names; add a header row such as time,q_hip")
     if len(header) == 1:
-        raise RecordingError(f"{where}: only one column, {header[0][:60]!r}; time and at least one are needed")
+        why = "time and at least one are needed"
+        if len(row.split()) > 1:
+            why += ", separated by commas. Are they separated by blanks, or is this a title? Start titles with #"
+        raise RecordingError(f"{where}: only one column, {header[0][:60]!r}; {why}")
     seen: dict[str, int] = {}
     for i, name in enumerate(header):
         if not name:
-            raise RecordingError(f"{where}: column {i + 1} of {len(header)} has no name")
+            why = "an index that a program wrote before the columns? (pandas: to_csv(..., index=False))"
+            if i == len(header) - 1:
+                why = "is there a comma at the end of every line?"
+            raise RecordingError(
+                f"{where}: column {i + 1} of {len(header)} has no name; {why} Name it, or take it out of the file"
+            )
         if name in seen:
             raise RecordingError(f"{where}: column {name!r} twice, as number {seen[name] + 1} and {i + 1}")
         seen[name] = i
@@ -181,8 +212,15 @@ def _rectangular(body: str, width: int) -> bool:
     return bool(np.all(rows[:, -1] == ord("\n")) and np.all(rows[:, :-1] == ord(",")))
 
 
-def _parse_slowly(body: str, header: list[str], wanted: list[int], line: int, path: Path) -> FloatArray:
-    """Parse cell by cell, to handle quotes and to say exactly what is wrong where."""
+def _parse_slowly(
+    body: str, header: list[str], wanted: list[int], optional: Collection[int], line: int, path: Path
+) -> tuple[FloatArray, dict[int, str]]:
+    """Parse cell by cell, to handle quotes and to say exactly what is wrong where.
+
+    Returns:
+        The table, and what to note of optional columns that do not hold numbers alone, by their number.
+    """
+    texts: dict[int, str] = {}
     blocks: list[FloatArray] = []
     rows: list[list[float]] = []
     reader = csv.reader(io.StringIO(body), strict=True, skipinitialspace=True)
@@ -193,7 +231,10 @@ def _parse_slowly(body: str, header: list[str], wanted: list[int], line: int, pa
             where = f"{path}, line {line + reader.line_num - 1}"
             if len(cells) != len(header):
                 raise RecordingError(_ragged(cells, header, where))
-            rows.append([_number(cells[i], header[i], where) for i in wanted])
+            for i in optional:
+                if i not in texts and not _is_number(cells[i].strip()):
+                    texts[i] = _no_numbers(header[i], cells[i].strip(), line + reader.line_num - 1)
+            rows.append([np.nan if i in texts else _number(cells[i], header[i], where) for i in wanted])
             if len(rows) == _ROWS_AT_ONCE:
                 blocks.append(np.array(rows, dtype=np.float64))
                 rows.clear()
@@ -201,11 +242,15 @@ def _parse_slowly(body: str, header: list[str], wanted: list[int], line: int, pa
         raise RecordingError(f"{path}, line {line + reader.line_num - 1}: cannot be read: {error}") from error
     if rows:
         blocks.append(np.array(rows, dtype=np.float64))
-    return np.concatenate(blocks)
+    return np.concatenate(blocks), texts
 
 
 def _ragged(cells: list[str], header: list[str], where: str) -> str:
     message = f"{where}: {len(cells)} cells, but the header names {len(header)} columns"
+    if cells[0].lstrip().startswith("#"):
+        return message + "; a comment stands above the header only: remove this one"
+    if len(cells) == len(header) + 1 and not cells[-1].strip():
+        return message + "; there is a comma at the end of the row: remove it, or add one to the header"
     if len(cells) > len(header):
         return message + "; are there decimal commas? Numbers need a decimal point"
     return message + "; is the file cut off here?"
@@ -213,16 +258,19 @@ def _ragged(cells: list[str], header: list[str], where: str) -> str:
 
 def _number(cell: str, name: str, where: str) -> float:
     text = cell.strip()
-    if not text:
+    if not text or text.lower() in MISSING:
+        what = f"holds {text!r}" if text else "is empty"
         raise RecordingError(
-            f"{where}: column {name} is empty. Nothing is filled in: cut the recording, or, if columns have "
-            "clocks of their own, write them to a format with columns of different length (NPZ, MAT, HDF5)"
+            f"{where}: column {name} {what}. Nothing is filled in: cut the recording, or, if columns have clocks of "
+            "their own, write them to a format with columns of different length (NPZ, MAT, HDF5)"
         )
     if not _is_number(text):
-        raise RecordingError(
-            f"{where}: column {name} holds {text[:60]!r} instead of a number; remove rows that hold none, as one "
-            "of units"
-        )
+        why = "remove rows that hold none, as one of units"
+        if _DATE.search(text):
+            why = "dates and times of day are not read: write seconds"
+        elif text == name:
+            why = "the header stands here again: are these several recordings? Split the file"
+        raise RecordingError(f"{where}: column {name} holds {text[:60]!r} instead of a number; {why}")
     return float(text)
 
 

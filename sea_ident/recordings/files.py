@@ -72,7 +72,7 @@ def read_recording(
         columns: Column of the recording -> name in the file, or `ColumnSource` with its unit, gear and so on.
             One `*` on both sides stands for the same text: `{"q_*": ColumnSource("pos_*", unit="deg")}`. Columns
             of the file that bear a name of the project already need no entry.
-        clocks: How columns of different clocks or rates are brought together; by default by linear
+        clocks: How columns of different clocks or rates are brought together; by default by
             interpolation at the sample times of the first clock, where all of them have data.
         memory_limit: Refuse files whose contents take more than this [bytes].
 
@@ -89,7 +89,9 @@ def read_recording(
     names = None if sources is None else _names(sources)
     with errors_of_libraries(path) as found:
         table = _format(path).read(path, names, memory_limit)
-    recording = assemble(table, sources, clocks, str(path))
+    # a name that is no text in the file system's encoding would stop every report that quotes it
+    source = str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+    recording = assemble(table, sources, clocks, source)
     if found:
         recording = replace(recording, warnings=(*recording.warnings, *found))
     for text in recording.warnings:
@@ -120,6 +122,17 @@ def write_recording(recording: Recording, path: str | Path) -> None:
     else:
         with atomic_file(path) as temporary, _named(path):
             _FORMATS[suffix].write(recording, temporary)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether `read_recording` would try to read what is there, by its name: a file of a known format, or a ROS 2 bag.
+
+    Args:
+        path: File or folder; a folder is a bag where it has the description of one.
+    """
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.is_file() and (path.suffix.lower() in _FORMATS or _is_packed_csv(path))
 
 
 def check_suffix(path: Path) -> None:
@@ -156,12 +169,16 @@ def _format(path: Path) -> _Format:
         near = sorted(other.name for other in path.parent.glob("*") if other.suffix in SUFFIXES)[:10]
         hint = f"; that folder has {', '.join(near)}" if near else ""
         raise RecordingError(f"{path}: no such file{hint}")
-    packed = path.name.lower().endswith(".csv.gz")
+    packed = _is_packed_csv(path)
     if not packed and path.suffix.lower() not in _FORMATS:
         raise RecordingError(_unknown_suffix(path))
     if path.stat().st_size == 0:
         raise RecordingError(f"{path}: the file is empty")
     return _PACKED_CSV if packed else _FORMATS[path.suffix.lower()]
+
+
+def _is_packed_csv(path: Path) -> bool:
+    return path.name.lower().endswith(".csv.gz")
 
 
 @contextmanager

@@ -207,8 +207,23 @@ class Recording:
             f"{self.source}: joint {joint!r} needs column {name}, which is absent.{hint} "
             f"There are: time, {', '.join(self.columns) or 'nothing else'}. "
             f"A column with another name is translated by columns={{'{name}': <name in the file>}}, on the command "
-            f"line by --column {name}=<name in the file>."
+            f"line by --column {name}=<name in the file>.{self._without(name, joint)}"
         )
+
+    def _without(self, name: str, joint: str) -> str:
+        """What to do where there is no such column under another name either."""
+        own = {kind for kind, other in filter(None, map(split_name, self.columns)) if other == joint}
+        if not own:
+            return (
+                f" If {joint!r} was held still and not recorded, leave it out of the joints that move (joints, on the "
+                "command line --joints)."
+            )
+        if name.startswith("theta_") and "q" in own:
+            return (
+                " If there is no spring between its motor and its link, describe its transmission as "
+                "transmission_interface/SimpleTransmission; of an elastic joint both sides must be measured."
+            )
+        return ""
 
 
 def _own(values: object, name: str, source: str) -> FloatArray:
@@ -251,18 +266,25 @@ def _check_time(time: FloatArray, source: str) -> None:
     if np.max(np.abs(time)) > LARGEST_VALUE:
         k = int(np.argmax(np.abs(time)))
         raise RecordingError(
-            f"{source}: time is {time[k]:g} s at sample {k}; if it is in nanoseconds, say "
-            "columns={'time': ColumnSource('time', unit='ns')}"
+            f"{source}: time is {time[k]:g} s at sample {k}, with a median interval of "
+            f"{float(np.median(np.diff(time))):g} s; {_clock(float(np.median(np.diff(time))))}"
         )
     falls = np.flatnonzero(np.diff(time) <= 0.0)
     if falls.size:
         k = int(falls[0])
         what = "repeats" if time[k + 1] == time[k] else "falls"
         equal = int(np.count_nonzero(np.diff(time) == 0.0))
+        why = "Put rows in order, or split a log that was restarted"
+        if equal == falls.size:
+            why = (
+                "Remove repeated rows, or write time with more digits; of samples that were taken evenly and stamped "
+                "coarsely say the interval (ColumnSource('time', interval=0.001), on the command line --column "
+                "'time=time,interval=0.001')"
+            )
         raise RecordingError(
             f"{source}: time {what} at sample {k + 1}: {float(time[k])!r} s, then {float(time[k + 1])!r} s. "
             f"It must rise strictly; {falls.size} of {time.size - 1} steps do not ({equal} repeat a time). "
-            "Remove repeated rows, write time with more digits, or split a log that was restarted"
+            f"{why}"
         )
     interval = float(np.median(np.diff(time)))
     if interval < SHORTEST_INTERVAL:
@@ -293,7 +315,9 @@ def _warnings(time: FloatArray, columns: Mapping[str, FloatArray], source: str) 
                 k = int(jumps[0])
                 found.append(
                     f"{source}: column {name} jumps by a whole turn after sample {k} (time {time[k]:g} s), and "
-                    f"{jumps.size} times in all; if the sensor wraps around, say ColumnSource(..., wraps_at=...)"
+                    f"{jumps.size} times in all; if the sensor wraps around, say where, in the unit of the file: "
+                    f"ColumnSource({name!r}, wraps_at=6.283185307), on the command line --column "
+                    f"'{name}={name},wraps_at=6.283185307'"
                 )
     unknown = [name for name in columns if split_name(name) is None]
     if unknown:

@@ -30,6 +30,7 @@ def springs(leg, factors):
         ((10.0, 10.0, 0.1), ()),
         ((-0.1, 0.1, 0.1), ()),  # that is another warning
         ((1 / 120, 1 / 100, 1.1 / 80), ("gear ratio",)),
+        ((1.0, 1.1 / 100, 0.9), ("gear_ratio=100)",)),
         ((0.1, 0.1, 0.1), ("another unit",)),
         ((1000.0, 1000.0, 1000.0), ("another unit",)),
     ],

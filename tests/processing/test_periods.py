@@ -115,3 +115,22 @@ def test_a_start_is_left_out_and_a_drift_is_not(start, drift, left_out):
     course = start * 0.03**p * np.cos(0.3 * shape) + drift * 0.85**p * shape
     stack = (shape + course + 1e-3 * rng.normal(size=(periods, period)))[:, :, None]
     assert leading_transients(stack) == left_out
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-3])
+def test_a_gap_is_compared_with_nothing(size):
+    """What is put into a gap to have an even grid bends the period by what it is not."""
+    seen = np.ones(len(TIME), dtype=bool)
+    seen[1234:1334] = False
+    values = motion(2.71828) + noise(size)
+    values[~seen] = np.linspace(values[1233], values[1334], 100)
+    found = detect_period(TIME, values, seen)
+    assert found is not None
+    assert abs(found - 2.71828) * (TIME[-1] / 2.71828) < 0.1 * INTERVAL
+
+
+def test_stamps_that_wander_do_not_make_a_multiple_the_period():
+    """One multiple fits a wandering clock best; that is of no use where the recording holds it hardly twice."""
+    wander = 1e-3 * np.sin(2.0 * np.pi * TIME / 14.0 * 11.0)
+    found = detect_period(TIME, motion(2.0, TIME + wander) + noise(1e-6))
+    assert found == pytest.approx(2.0, abs=1e-3)

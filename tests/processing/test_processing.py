@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 from estimation.synthetic import record
@@ -160,3 +162,42 @@ def test_period_is_that_of_the_reference_where_elastic_and_rigid_joints_mix(leg,
     told = process(Recording(recording.time, {**recording.columns, **reference}, "test"), leg)
     assert told.period == pytest.approx(10.0)
     assert any("found from the reference" in note for note in told.notes)
+
+
+def with_hole(recording, first, last):
+    seen = np.r_[0:first, last : recording.samples]
+    columns = {name: values[seen] for name, values in recording.columns.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return Recording(recording.time[seen], columns, recording.source)
+
+
+def process_quietly(recording, robot):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return process(recording, robot)
+
+
+def test_samples_beside_a_gap_stay_where_they_are(leg, truth):
+    """Where a gap is the only unevenness the samples of other periods need no interpolation."""
+    whole = record(leg, truth, 6, torque_noise=0.05, encoder_noise=1e-6)
+    period = 10.0
+    samples = round(period * whole.sample_rate)
+    holed = with_hole(whole, int(2.3 * samples), int(2.45 * samples))
+    found = process_quietly(holed, leg)
+    assert any("1 of 6 periods have a gap" in text for text in found.warnings)
+    assert found.period == pytest.approx(period, rel=1e-6)
+    assert found.samples == samples
+    assert found.places == (0, 1, 3, 4, 5)
+    own = process(whole, leg, period=period)
+    np.testing.assert_allclose(found.period_tau_motor, own.period_tau_motor[[0, 1, 3, 4, 5]], atol=1e-6)
+
+
+def test_nothing_is_filled_into_a_gap_where_there_is_no_period(leg, truth):
+    whole = record(leg, truth, 1, torque_noise=0.05, encoder_noise=1e-6)
+    first, last = int(0.4 * whole.samples), int(0.5 * whole.samples)
+    holed = with_hole(whole, first, last)
+    found = process_quietly(holed, leg)
+    assert any("in 1 gaps in time and within" in text for text in found.warnings)
+    inside = (found.motion.time > whole.time[first]) & (found.motion.time < whole.time[last - 1])
+    assert not np.any(inside)

@@ -1,5 +1,7 @@
 """Clocks brought together, judged by signals known at every instant."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -180,3 +182,29 @@ def test_a_rate_can_be_asked_for_with_one_clock(tmp_path):
     leg = read_recording(tmp_path / "x.npz", clocks=ClockAlignment(rate=20.0))
     np.testing.assert_allclose(leg.time, 0.05 * np.arange(7))
     np.testing.assert_allclose(leg.columns["q_hip"], 10 * leg.time, atol=1e-12)
+
+
+def test_positions_of_a_slow_clock_are_joined_without_corners():
+    """Straight lines between samples 20 ms apart are wrong by a tenth of the deflection of a spring."""
+    fast, slow = np.arange(0.0, 4.0, 0.002), np.arange(0.0, 4.0, 0.02)
+    streams = [
+        Stream("fast", fast, {"q_a": np.sin(5.0 * fast)}),
+        Stream("slow", slow, {"theta_a": np.sin(5.0 * slow), "tau_motor_a": np.sign(np.sin(5.0 * slow) + 0.01)}),
+    ]
+    recording = align_streams(streams).recording
+    error = recording.columns["theta_a"] - np.sin(5.0 * recording.time)
+    assert np.max(np.abs(error)) < 1e-5
+    assert np.max(np.abs(recording.columns["tau_motor_a"])) == 1.0
+
+
+def test_splines_stop_at_gaps():
+    fast = np.arange(0.0, 4.0, 0.002)
+    slow = np.arange(0.0, 4.0, 0.02)
+    slow = slow[(slow < 1.0) | (slow > 2.0)]
+    values = np.where(slow < 1.5, 1.0, 100.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        recording = align_streams(
+            [Stream("fast", fast, {"q_a": np.sin(fast)}), Stream("slow", slow, {"theta_a": values})]
+        ).recording
+    assert set(np.unique(np.round(recording.columns["theta_a"], 9))) == {1.0, 100.0}

@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings import ColumnSource
-from sea_ident.recordings.columns import convert
+from sea_ident.recordings.columns import check_unit_in_name, convert
 
 
 @pytest.mark.parametrize(
@@ -84,3 +84,30 @@ def test_impossible_translations_are_refused(how, part):
 def test_units_and_gears_must_fit_the_kind(target, how, part):
     with pytest.raises(RecordingError, match=part):
         convert(np.ones(3), target, ColumnSource("x", **how))
+
+
+@pytest.mark.parametrize(
+    ("target", "name", "unit", "said"),
+    [
+        ("q_a", "pos (deg)", None, "unit=deg"),
+        ("q_a", "pos [deg]", "rad", "unit=deg"),
+        ("q_a", "pos (°)", None, "unit=deg"),
+        ("time", "Time(ms)", None, "unit=ms"),
+        ("current_a", "i [mA]", None, "unit=mA"),
+        ("tau_motor_a", "torque (mNm)", None, "unit=mN m"),
+        ("q_a", "pos (rad)", "deg", "unit=rad"),
+        ("q_a", "pos (deg)", "deg", None),
+        ("q_a", "pos [rad]", None, None),
+        ("tau_motor_a", "torque [Nm]", None, None),
+        ("q_a", "pos[3]", None, None),
+        ("q_a", "pos (filtered)", None, None),
+        ("dq_a", "v (deg/s)", "deg/s", None),
+    ],
+)
+def test_a_unit_in_the_name_of_a_column_is_not_passed_over(target, name, unit, said):
+    how = ColumnSource(name, unit=unit)
+    if said is None:
+        check_unit_in_name(target, how, "log.csv")
+        return
+    with pytest.raises(RecordingError, match=f"log.csv: .* say {said},"):
+        check_unit_in_name(target, how, "log.csv")

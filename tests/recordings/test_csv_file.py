@@ -108,6 +108,17 @@ def test_clean_files_are_parsed_by_numpy_alone(read, monkeypatch):
         ("time,q_hip\n0,\u0661\n1,2\n", ["instead of a number"]),
         ("time,q_hip,q_hip\n0,1,2\n", ["'q_hip' twice", "2 and 3"]),
         ("time,q_hip,\n0,1,\n", ["column 3 of 3 has no name"]),
+        ("time,q_hip,\n0,1,\n", ["column 3 of 3 has no name", "comma at the end of every line"]),
+        (",time,q_hip\n0,0,1\n", ["column 1 of 3 has no name", "index=False"]),
+        ("time,q_hip\n0,1,\n1,2,\n", ["line 2", "comma at the end of the row"]),
+        ("time,q_hip\n0,1\n# event\n1,2\n", ["line 3", "comment stands above the header only"]),
+        ("# time,q_hip\n0,1\n1,2\n", ["line 2", "take the # away"]),
+        ("time q_hip\n0 1\n1 2\n", ["line 1", "separated by blanks"]),
+        ("Logger of the lab\ntime,q_hip\n0,1\n", ["line 1", "Start titles with #"]),
+        ("time,q_hip\n0,1\n1,NA\n", ["line 3", "column q_hip holds 'NA'", "Nothing is filled in"]),
+        ("time,q_hip\n2026-11-26T10:00:00,1\n", ["line 2", "column time", "write seconds"]),
+        ("time,q_hip\n10:00:00.002,1\n", ["line 2", "column time", "write seconds"]),
+        ("time,q_hip\n0,1\ntime,q_hip\n0,1\n", ["line 3", "several recordings"]),
         ('time,"q_hip\n0,1\n', ["header row cannot be read"]),
         ("t,q_hip\n0,1\n1,2\n", ["no column 'time'", "t, q_hip", "columns={'time': 't'}"]),
         ("time,q_hip\n0,1\n1,nan\n", ["q_hip is nan", "sample 1", "time 1 s", "1 of 2"]),
@@ -138,6 +149,23 @@ def test_only_columns_asked_for_are_parsed(read):
     assert set(leg.columns) == {"q_hip", "q_knee"}
     assert "left out of the file: mode" in leg.notes
     assert any("'pos', in deg" in note for note in leg.notes)
+
+
+@pytest.mark.parametrize("mode", [("idle", "run", "run"), ("", "", "run"), ("1", "2", "off")])
+def test_foreign_columns_that_hold_no_numbers_are_left_out_as_from_other_formats(read, mode):
+    rows = [f"{line},{text},7" for line, text in zip(FINE.splitlines()[1:], mode, strict=True)]
+    with pytest.warns(UserWarning, match="kept as they are: battery;"):
+        leg = read("\n".join([FINE.splitlines()[0] + ",mode,battery", *rows]))
+    assert leg.time.tolist() == [0.0, 0.05, 0.1]
+    assert leg.columns["battery"].tolist() == [7.0, 7.0, 7.0]
+    assert "mode" not in leg.columns
+    assert any("left out of the file: mode (" in note for note in leg.notes)
+
+
+def test_a_column_of_text_keeps_the_fast_way(read, monkeypatch):
+    monkeypatch.setattr(csv_file, "_parse_slowly", lambda *_: pytest.fail("parsed cell by cell"))
+    rows = [f"{line},idle" for line in FINE.splitlines()[1:]]
+    assert set(read("\n".join([FINE.splitlines()[0] + ",mode", *rows])).columns) == {"q_hip", "current_hip"}
 
 
 def test_ragged_rows_are_seen_even_where_the_commas_balance(read):

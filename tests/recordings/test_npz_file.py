@@ -111,3 +111,17 @@ def test_an_array_that_appears_twice_is_refused(tmp_path):
 
 def test_a_plain_name_is_a_source_in_si_units():
     assert as_source("pos") == ColumnSource("pos")
+
+
+def test_what_is_no_signal_and_bears_no_name_of_the_project_stops_nothing(tmp_path):
+    time = np.arange(5) * 0.01
+    path = tmp_path / "log.npz"
+    np.savez(path, time=time, q_a=time, gains=np.ones(3), gps=np.array([1.0, np.nan, 2.0, 3.0, np.nan]))
+    recording = read_recording(path)
+    assert set(recording.columns) == {"q_a"}
+    (note,) = (note for note in recording.notes if note.startswith("left out"))
+    assert "gains (3 values, where time has 5)" in note
+    assert "gps (nan at sample 1, and 2 times in all)" in note
+    np.savez(path, time=time, q_a=np.array([1.0, np.nan, 2.0, 3.0, np.nan]))
+    with pytest.raises(RecordingError, match="q_a is nan at sample 1"):
+        read_recording(path)

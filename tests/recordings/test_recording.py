@@ -45,6 +45,14 @@ def test_absent_channel_names_joint_column_file_and_what_exists():
         assert part in message
 
 
+def test_an_absent_channel_says_what_to_do_without_it():
+    leg = recording(q_hip=TIME, current_hip=TIME)
+    with pytest.raises(RecordingError, match=r"'knee' was held still .* --joints"):
+        leg.channel("q", ["knee"])
+    with pytest.raises(RecordingError, match="describe its transmission as transmission_interface/SimpleTransmission"):
+        leg.channel("theta", ["hip"])
+
+
 @pytest.mark.parametrize(("kind", "joints", "part"), [("torque", ["hip"], "tau_motor"), ("q", "hip", "sequence")])
 def test_channel_refuses_unknown_kinds_and_bare_names(kind, joints, part):
     with pytest.raises(RecordingError, match=part):
@@ -74,6 +82,11 @@ def test_arrays_are_copied_and_read_only():
         ([0.0], ["at least 2"]),
         ([], ["at least 2"]),
         ([0.0, 1.7e18, 1.8e18], ["nanoseconds"]),
+        ([0.0, 0.1, 0.05], ["falls at sample 2", "split a log that was restarted"]),
+        ([0.0, 0.1, 0.1], ["repeats at sample 2", "interval=0.001"]),
+        ([1.7e12, 1.7e12 + 2.0, 1.7e12 + 4.0], ["milliseconds", "--column time=time,unit=ms"]),
+        ([1.7e15, 1.7e15 + 2e3, 1.7e15 + 4e3], ["microseconds", "--column time=time,unit=us"]),
+        ([1.7e18, 1.7e18 + 2e6, 1.7e18 + 4e6], ["nanoseconds", "--column time=time,unit=ns"]),
         ([0.0, 1e-12, 2e-12], ["1e-12 s"]),
         ([[0.0, 1.0]], ["shape (1, 2)"]),
         (["a", "b"], ["instead of real numbers"]),

@@ -182,3 +182,12 @@ def test_a_mapped_column_wins_over_one_of_the_same_name(tmp_path):
     leg = read_recording(path, columns={"q_hip": "pos", "dq_hip": ColumnSource("dq_hip", unit="rpm")})
     assert leg.columns["q_hip"].tolist() == [0.0, -1.0, -2.0]
     np.testing.assert_allclose(leg.columns["dq_hip"], 10 * ramp * 2 * np.pi / 60)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are any bytes on Linux")
+def test_a_name_that_is_no_text_can_be_quoted(tmp_path):
+    path = tmp_path / os.fsdecode(b"r\xff.csv")
+    path.write_text("time,q_a\n0,1\n0.01,2\n")
+    recording = read_recording(path)
+    assert recording.source.endswith(r"r\udcff.csv")
+    recording.source.encode("utf-8")
