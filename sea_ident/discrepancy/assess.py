@@ -24,7 +24,7 @@ from sea_ident.discrepancy.judge import (
     spread,
     too_short,
 )
-from sea_ident.discrepancy.linear import whiten
+from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, closed_freedom, unstacked
 from sea_ident.discrepancy.physics import physical
@@ -40,6 +40,9 @@ from sea_ident.singular_values import svd
 
 THE_SAME = 0.05
 """Two effects between whose statistics there is less than this are one and the same on this motion."""
+
+EXACTLY = 1e-6
+"""Share of a column outside of the span of others up to which it is one of them but for rounding [-]."""
 
 LOOKS_ALIKE = 0.9
 """Share of one effect in the span of another from which on they are called confusable."""
@@ -94,6 +97,9 @@ def _alike(bench: Bench, now: Settled, position: int) -> tuple[Alternative, ...]
         share = float((reduced.whitened - new.whitened) @ explained / (explained @ explained))
         other = Alternative(candidate.effect.name, candidate.effect.joint, min(max(share, 0.0), 1.0), fit=new)
         worse = new.statistic - fit.statistic
+        # what has a column more that these data do not ask for is the same effect, and no other motion will tell them
+        if price > 0.0 and worse + price > 0.0 and _is_part_of(own, new.effects[position], bench, now):
+            continue
         # what it saves by fewer parameters makes up for nothing that it explains less
         behind = worse + max(price, 0.0)
         if not worse < enough:
@@ -110,6 +116,17 @@ def _alike(bench: Bench, now: Settled, position: int) -> tuple[Alternative, ...]
         alike.append(replace(other, dearer=not any(abs(score - s) < THE_SAME for s in scores)))
     unique = {(other.effect, other.joint): other for other in sorted(alike, key=_rank)}
     return tuple(sorted(unique.values(), key=lambda other: (not other.as_likely, -other.cos2)))
+
+
+def _is_part_of(one: Effect, other: Effect, bench: Bench, now: Settled) -> bool:
+    """Whether an effect is another whose further columns are zero, as a constant is a spring without stiffness."""
+    if isinstance(one, SignalEffect) or isinstance(other, SignalEffect):
+        return False
+    if len(other.columns(bench.robot)) <= len(one.columns(bench.robot)):
+        return False
+    whitener, effects = bench.whitener(now.noise), now.fit.effects
+    own, whole = (whiten(whitener, bench.column_spectra(e, effects) * now.fit.scale[:, None]) for e in (one, other))
+    return bool(np.linalg.norm(off(span(whole), own)) < EXACTLY * np.linalg.norm(own))
 
 
 def _rank(other: Alternative) -> tuple[bool, float]:

@@ -198,7 +198,7 @@ def penalty(effect: Effect, bench: Bench) -> float:
 
 def slowest(effect: Effect) -> bool:
     """Whether a wave along a path ended as the longest that there is: then it only stands in for a constant."""
-    return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.shapes)
+    return any(s.name == "order" and float(getattr(effect, s.name)) <= 1.02 * s.lower for s in effect.ranges)
 
 
 def never_closed(bench: Bench, effects: Sequence[Effect], position: int) -> bool:

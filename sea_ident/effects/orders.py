@@ -4,6 +4,9 @@ import numpy as np
 
 from sea_ident.effects.state import State
 
+LEAST = 0.5
+"""Lowest order of what repeats over the turn of a joint: a wave of two turns [1/rad]."""
+
 _GEAR_MULTIPLES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
 
 
@@ -33,6 +36,22 @@ def orders(state: State, joint: str, most: int) -> tuple[float, ...]:
     found = np.unique(np.concatenate([grid, gear]))
     found = found[found <= highest]
     return tuple(float(order) for order in found) if len(found) else (float(lowest),)
+
+
+def least_order(state: State, joint: str) -> float:
+    """Order of the longest wave that counts as one, and not as a straight line over the way that a joint goes.
+
+    Args:
+        state: robot and motion.
+        joint: the joint.
+
+    Returns:
+        `LEAST` where the joint turns. A slide has no turns: half the lowest order that is tried there, to two digits,
+        so that columns are found again in the next search [1/rad] or [1/m].
+    """
+    if not state.robot.joints[state.robot.index(joint)].prismatic:
+        return LEAST
+    return float(f"{0.5 * orders(state, joint, 1)[0]:.2g}")
 
 
 def highest_order(state: State, joint: str) -> float:

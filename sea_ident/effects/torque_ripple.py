@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column, JointEffect, Shape, titled
-from sea_ident.effects.orders import orders
+from sea_ident.effects.orders import LEAST, least_order, orders
 from sea_ident.effects.state import Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -24,15 +24,17 @@ class TorqueRipple(JointEffect):
         joint: joint at which it acts.
         order: n, periods per turn of the joint (of the motor: times the gear ratio) [-].
         number: which one of those at the joint it is, from 1 on; it makes the names of its parameters unique.
+        least: lowest order that counts as one [-].
     """
 
     order: float = 1.0
     number: int = 1
+    least: float = LEAST
 
     name: ClassVar[str] = "torque_ripple"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Ghorbel, Gandhi, Alpeter, On the kinematic error in harmonic drive gears, 2001"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", 0.5, 1e5),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/rad", LEAST, 1e5),)
     depends_on: ClassVar[tuple[str, ...]] = ("theta",)
 
     def __post_init__(self) -> None:
@@ -57,7 +59,17 @@ class TorqueRipple(JointEffect):
 
     def variants(self, state: State) -> tuple[Self, ...]:
         """All orders that this motion tells apart, up to those too fast for its samples."""
-        return tuple(replace(self, order=order) for order in orders(state, self.required_joint, 300))
+        own = self.on(state)
+        return tuple(replace(own, order=order) for order in orders(state, self.required_joint, 300))
+
+    @property
+    def ranges(self) -> tuple[Shape, ...]:
+        """From the lowest order that counts as one on the motion."""
+        return tuple(replace(order, lower=self.least) for order in self.shapes)
+
+    def on(self, state: State) -> Self:
+        """With the lowest order that counts as one: less is a straight line over the way of a slide."""
+        return replace(self, least=least_order(state, self.required_joint))
 
     def beside(self) -> Self | None:
         """The next one, of another order."""

@@ -13,13 +13,11 @@ import scipy.linalg
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects import Column
+from sea_ident.estimation.carried_rotors import CarriedRotors, carried_rotors
 from sea_ident.estimation.conic import ConicProgram
 from sea_ident.estimation.model import Model
 from sea_ident.estimation.physical_result import CONSISTENT, Box, PhysicalParameters, Pull
-from sea_ident.estimation.pseudo_inertia import (
-    pseudo_inertia_basis,
-    reference_pseudo_inertia,
-)
+from sea_ident.estimation.pseudo_inertia import pseudo_inertia, pseudo_inertia_basis, reference_pseudo_inertia
 from sea_ident.exceptions import IdentificationError
 from sea_ident.one_thread import one_thread
 from sea_ident.regressor import prior_parameters
@@ -35,7 +33,8 @@ def physical_parameters(
 ) -> PhysicalParameters:
     """Find full standard parameters of real bodies that agree with an identified model.
 
-    Every pseudo-inertia is positive definite, rotor inertias and friction are not negative. First the base parameters
+    Every pseudo-inertia is positive definite, rotor inertias and friction are not negative, and a link has room for the
+    rotors that it carries where it has in the description. First the base parameters
     nearest to the identified ones (weighted least squares on the reduced data) that such bodies can have; these are the
     identified ones wherever possible. Then, among all bodies with exactly these base parameters, those nearest to the
     description: by the entropic (log-determinant) divergence of the pseudo-inertias, or by Euclidean distance.
@@ -93,6 +92,7 @@ class _Problem:
     bodies: tuple[str, ...]
     places: tuple[IntArray, ...]
     references: tuple[FloatArray, ...]
+    rotors: tuple[CarriedRotors, ...]
     signed: IntArray
     box_rows: FloatArray
 
@@ -137,20 +137,19 @@ class _Problem:
             bodies=tuple(present),
             places=places,
             references=references,
+            rotors=carried_rotors(robot, names, present, np.where(np.isfinite(prior), prior, guess), references),
             signed=signed,
             box_rows=np.array(rows).reshape(len(rows), len(columns)),
         )
 
     def _constrain(self, program: ConicProgram, interior: float, without: str | None) -> None:
         """Pseudo-inertias, signs and boxes; each pseudo-inertia in the metric of its reference, so near unity."""
-        basis = pseudo_inertia_basis()
-        for body, place, reference in zip(self.bodies, self.places, self.references, strict=True):
+        for k, body in enumerate(self.bodies):
             if body == without:
                 continue
             coefficients = np.zeros((program.size, 4, 4))
-            half = np.linalg.inv(np.linalg.cholesky(reference))
-            coefficients[place] = half @ (basis * self.scale[place, None, None]) @ half.T
-            program.positive_semidefinite(coefficients, -interior * np.eye(4))
+            coefficients[: len(self.columns)], offset = self._without_rotors(k)
+            program.positive_semidefinite(coefficients, offset - interior * np.eye(4))
         rows = np.zeros((len(self.signed), program.size))
         rows[np.arange(len(self.signed)), self.signed] = 1.0
         program.nonnegative(rows, np.zeros(len(rows)))
@@ -159,6 +158,22 @@ class _Problem:
             rows[:, : len(self.columns)] = self.box_rows * self.scale
             rows /= np.linalg.norm(rows, axis=1, keepdims=True)
             program.nonnegative(rows, np.zeros(len(rows)))
+
+    def _without_rotors(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """(p, 4, 4) and (4, 4): pseudo-inertia of a body without its rotors, of x and constant, near unity."""
+        place, rotors = self.places[k], self.rotors[k]
+        half = np.linalg.inv(np.linalg.cholesky(self.references[k]))
+        coefficients = -rotors.coefficients * self.scale[:, None, None]
+        coefficients[place] += pseudo_inertia_basis() * self.scale[place, None, None]
+        return half @ coefficients @ half.T, half @ -rotors.constant @ half.T
+
+    def possible(self, values: FloatArray) -> bool:
+        """Whether parameters (p,) are those of bodies, beyond what the solver's accuracy lets through."""
+        for place, reference in zip(self.places, self.references, strict=True):
+            half = np.linalg.inv(np.linalg.cholesky(reference))
+            if np.linalg.eigvalsh(half @ pseudo_inertia(values[place]) @ half.T)[0] <= 0.0:
+                return False
+        return True
 
     def nearest(self, model: Model, without: str | None = None) -> FloatArray:
         """(p,) possible parameters with base parameters nearest to the identified ones; one body may be let off."""
@@ -179,9 +194,11 @@ class _Problem:
         """As `drawn`; by the other distance, or not at all, where the solver does not get through."""
         for chosen in dict.fromkeys((pull, Pull.EUCLIDEAN)):
             try:
-                return self.drawn(target, nearest, chosen), chosen
+                found = self.drawn(target, nearest, chosen)
             except IdentificationError:
                 continue
+            if self.possible(found) or not self.possible(nearest):
+                return found, chosen
         return nearest, None
 
     def drawn(self, target: FloatArray, start: FloatArray, pull: Pull) -> FloatArray:
@@ -216,8 +233,12 @@ class _Problem:
             if entropic:
                 program.gradient[:m] += np.trace(along, axis1=1, axis2=2)
                 _log_det(program, coefficients, offset, m + 14 * k)
-            else:
-                program.positive_semidefinite(coefficients, offset - 0.1 * INTERIOR * np.eye(4))
+            if not entropic or self.rotors[k].any:
+                whole, constant = self._without_rotors(k)
+                coefficients = np.zeros((program.size, 4, 4))
+                coefficients[:m] = np.einsum("cm,cij->mij", free, whole)
+                constant = constant + np.einsum("c,cij->ij", particular, whole)
+                program.positive_semidefinite(coefficients, constant - 0.1 * INTERIOR * np.eye(4))
         rows = np.zeros((len(self.signed), program.size))
         rows[:, :m] = free[self.signed]
         # parameters that the data hold at zero are there already; a hair of slack keeps the problem solvable

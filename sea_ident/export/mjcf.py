@@ -161,8 +161,9 @@ class _Writer:
         if rotors and least < 0.0:
             joints = ", ".join(repr(rotor.joint) for rotor, _ in rotors)
             raise ExportError(
-                f"link {name!r}: its inertia leaves no room for the rotors of {joints} that it carries; MuJoCo cannot "
-                f"hold this robot. Identify with better priors, or mount the rotors on another link (<rotorAxis>)"
+                f"link {name!r}: its inertia leaves no room for the rotors of {joints} that it carries: it lacks "
+                f"{-2.0 * least:.3g} kg m2 of what they have about their diameters; MuJoCo cannot hold this robot. "
+                f"Count the rotors into the <inertia> of this link, or mount them on another (<rotorAxis>)"
             )
         # a body without extension along some axis: MuJoCo wants strictly positive moments that a body can have
         about_centre += 2.0 * max(_SMALLEST - least, 0.0) * np.eye(3) if least < _SMALLEST else 0.0

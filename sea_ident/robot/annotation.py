@@ -8,6 +8,7 @@ from lxml import etree
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError
 from sea_ident.robot.actuator import Actuator, SeriesElasticActuator
+from sea_ident.robot.spelling import check_spelling
 from sea_ident.robot.urdf import MOVING_TYPES, UrdfTree
 from sea_ident.robot.workspace import (
     HALF_SPACE,
@@ -248,7 +249,12 @@ def parse_annotation(root: etree._Element, file: str, tree: UrdfTree) -> Annotat
             continue
         if kind == RIGID and _says_nothing(transmission):
             continue
+        check_spelling(transmission, where)
         joint = _one_joint(transmission, tree, where)
+        if kind == RIGID and transmission.find("seriesElastic") is not None:
+            raise RobotError(
+                f"{where}: has a <seriesElastic>, and its type is {RIGID}; for a spring use {SERIES_ELASTIC}"
+            )
         if joint in actuators:
             raise RobotError(f"{where}: joint {joint!r} already has the transmission of {actuators[joint].name!r}")
         transmission.set("type", kind)

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident.exceptions import RobotError
+from sea_ident.robot.actuator import Actuator
 from sea_ident.robot.annotation import Annotation
 from sea_ident.robot.model import Joint
 from sea_ident.robot.urdf import UrdfTree
@@ -106,3 +107,26 @@ def check_annotation(tree: UrdfTree, annotation: Annotation, joints: Sequence[Jo
         if mimic is not None:
             notes.append(f"transmission on {name!r} is ignored: that joint mimics {mimic.joint!r}")
     return notes
+
+
+def check_groups(tree: UrdfTree, actuators: Sequence[Actuator]) -> None:
+    """Refuse motors of one group that state different rotor inertias: they share one parameter.
+
+    Args:
+        tree: the kinematic tree.
+        actuators: those of the joints that move.
+
+    Raises:
+        RobotError: if two of a group state different ones.
+    """
+    stated: dict[str, Actuator] = {}
+    for actuator in actuators:
+        if actuator.rotor_inertia is None:
+            continue
+        first = stated.setdefault(actuator.rotor_group, actuator)
+        if first.rotor_inertia != actuator.rotor_inertia:
+            raise RobotError(
+                f"{tree.file}: the motors of {first.joint!r} and {actuator.joint!r} are of one group "
+                f"{actuator.rotor_group!r}, and state {first.rotor_inertia:g} and {actuator.rotor_inertia:g} kg m2 as "
+                "<rotorInertia>; state the same for both, or give them groups of their own"
+            )

@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RobotError, SeaIdentWarning
 from sea_ident.robot.annotation import Annotation, parse_annotation
 from sea_ident.robot.assemble import add_rotors, link_model, lock_joints
-from sea_ident.robot.checks import check_annotation, check_bodies
+from sea_ident.robot.checks import check_annotation, check_bodies, check_groups
 from sea_ident.robot.joints import moving_joints, root_master
 from sea_ident.robot.limits import Limits
 from sea_ident.robot.model import Joint, Robot
@@ -75,6 +75,7 @@ def robot_from_text(
     limits, notes = _limits(tree, parsed, joint_list, locked)
     notes += check_bodies(tree, model) + check_annotation(tree, parsed, joint_list)
     actuators = [joint.actuator for joint in joint_list if joint.actuator is not None]
+    check_groups(tree, actuators)
     extended = add_rotors(tree, model, [joint.name for joint in joint_list], actuators)
     robot = Robot(
         name=tree.name,

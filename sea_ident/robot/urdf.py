@@ -170,7 +170,8 @@ def _joint(element: etree._Element, file: str) -> JointElement:
     if kind in MOVING_TYPES:
         length = float(np.linalg.norm(axis))
         if length < 1e-3 or abs(length - 1.0) > 1e-2:
-            raise RobotError(f"{where}: axis {axis.tolist()} has length {length:.6g}, not 1; give a unit axis")
+            unit = "" if length < 1e-3 else f": {' '.join(f'{part:.9g}' for part in axis / length)}"
+            raise RobotError(f"{where}: axis {axis.tolist()} has length {length:.6g}, not 1; give a unit axis{unit}")
         axis = axis / length
     limit, dynamics, mimic_element = element.find("limit"), element.find("dynamics"), element.find("mimic")
     inf = float("inf")

@@ -76,7 +76,7 @@ def simulate(
         reference: a Fourier series (or an Excitation), followed again and again; or a Motion, followed once.
         periods: number of recorded periods of a Fourier series.
         seed: of noise and jitter; equal seeds give equal results.
-        sensors: noise and resolution; `SensorNoise()` by default, `SensorNoise.none()` for exact signals.
+        sensors: noise and resolution; `SensorNoise.usual(robot)` by default, `SensorNoise.none()` for exact signals.
         jitter: friction that varies from pass to pass, at all joints alike; `FrictionJitter.usual(robot)` by default.
         controller: `VelocityController()` by default, which applies the reference to the motors.
         friction: Coulomb friction around zero speed, one law or one per joint; `SmoothCoulomb.usual(robot)` by default.
@@ -173,7 +173,8 @@ def simulate(
     if warm_up is not None:
         signals["temperature"] = warm_up.at(motion.time, robot.n)
     signals = measured_signals(plant.robot, [each.effect for each in effects], motion.time, signals)
-    columns = sensed_columns(plant, motion.time, motion.dtheta, signals, sensors or SensorNoise(), streams[1])
+    sensors = sensors or SensorNoise.usual(robot)
+    columns = sensed_columns(plant, motion.time, motion.dtheta, signals, sensors, streams[1])
     reference_motion = _sampled(drive.reference, motion.time, clock, len(method.nodes))
     for i, joint in enumerate(robot.joints):
         kind, values = ("theta", reference_motion.theta) if joint.elastic else ("q", reference_motion.q)

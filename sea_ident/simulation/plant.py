@@ -192,6 +192,9 @@ def plant_from_robot(robot: Robot) -> Plant:
             numbers["cubic_stiffness"][i] = spring.cubic_stiffness or 0.0
         else:
             known["rotorInertia"] = actuator.rotor_inertia
+            # a rigid joint has one friction, wherever it is stated
+            stated = {"viscousFriction": joint.damping, "coulombFriction": joint.friction}
+            known |= {tag: value for tag, value in stated.items() if known[tag] is None}
         missing += [f"{joint.name}: {tag}" for tag, value in needed.items() if value is None]
         for tag, value in known.items():
             if value is None:
@@ -205,7 +208,8 @@ def plant_from_robot(robot: Robot) -> Plant:
     if missing:
         raise SimulationError(
             f"{robot.source}: an elastic joint cannot be simulated without its spring and the inertia of its rotor, "
-            f"and the <transmission> leaves out {'; '.join(missing)}. Add them, or in Python give simulate(plant=...)"
+            f"and the <transmission> states none, or zero, of {'; '.join(missing)}. State them, or in Python give "
+            "simulate(plant=...)"
         )
     notes = tuple(
         f"no {tag}, so {meaning}: {', '.join(absent[tag])}" for tag, meaning in _ABSENT.items() if tag in absent

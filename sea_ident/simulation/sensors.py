@@ -8,9 +8,14 @@ from scipy.signal import lfilter
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import SimulationError
+from sea_ident.robot import Robot
+from sea_ident.simulation.friction import SLIDE
 from sea_ident.simulation.plant import Plant
 
 Spread = float | tuple[float, ...]
+
+PART_OF_LIMIT = 0.01
+"""Largest usual noise of torque, as a part of the limit of the torque of the joint [-]."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,36 @@ class SensorNoise:
             values = np.atleast_1d(np.asarray(getattr(self, f.name), dtype=np.float64))
             if values.ndim != 1 or not np.all(np.isfinite(values)) or np.any(values < 0.0):
                 raise SimulationError(f"sensor noise: {f.name} is {getattr(self, f.name)}; give numbers >= 0")
+
+    @staticmethod
+    def usual(robot: Robot) -> "SensorNoise":
+        """That of the sensors that a robot would have.
+
+        Encoders of slides are ten times as fine, in metres, as those of turning joints in radians. What measures
+        current or torque has a standard deviation of 1 % of what the joint may bear, where that is less than usual: a
+        finger has other sensors than a leg.
+
+        Args:
+            robot: the robot.
+        """
+        usual = SensorNoise()
+        fine = np.where([joint.prismatic for joint in robot.joints], SLIDE, 1.0)
+        torque = np.minimum(usual.per_joint("motor_torque", robot.n), PART_OF_LIMIT * robot.limits.torque)
+        drives = [joint.actuator for joint in robot.joints]
+        constants = np.array([np.nan if a is None else (a.torque_constant or np.nan) for a in drives])
+        most = PART_OF_LIMIT * robot.limits.torque / np.abs(robot.gear_ratios * constants)
+
+        def as_fine(name: str) -> tuple[float, ...]:
+            return tuple((fine * usual.per_joint(name, robot.n)).tolist())
+
+        return SensorNoise(
+            link_position=as_fine("link_position"),
+            motor_position=as_fine("motor_position"),
+            link_resolution=as_fine("link_resolution"),
+            motor_resolution=as_fine("motor_resolution"),
+            current=tuple(np.fmin(usual.per_joint("current", robot.n), most).tolist()),
+            motor_torque=tuple(torque.tolist()),
+        )
 
     @staticmethod
     def none() -> "SensorNoise":

@@ -299,3 +299,31 @@ def test_an_effect_is_found_about_the_smallest_size_and_not_far_below(laboratory
 
     assert named(1.5) == [joint]
     assert named(0.3) == []
+
+
+def test_a_constant_is_not_taken_for_a_spring_whose_stiffness_the_data_do_not_ask_for():
+    """A rigid joint feels a spring across it as the same constant, with a column more: no motion would tell them."""
+    robot = sea_ident.robot.robot_from_text(
+        '<robot name="turntable"><link name="base"/><link name="table"><inertial><origin xyz="0.03 0.01 0"/>'
+        '<mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="pan" type="continuous"><parent link="base"/><child link="table"/><axis xyz="0 0 1"/></joint>'
+        '<transmission name="t" type="transmission_interface/SimpleTransmission"><joint name="pan"/><actuator name="m">'
+        "<mechanicalReduction>20</mechanicalReduction><rotorInertia>1e-5</rotorInertia>"
+        "<viscousFriction>0.1</viscousFriction><coulombFriction>0.2</coulombFriction></actuator></transmission></robot>",
+        "turntable.urdf",
+    )
+    series = FourierSeries(0.2, np.zeros(1), np.array([[0.3, -0.5, 0.2, 0.4]]), np.array([[-0.4, 0.3, 0.5, -0.2]]))
+
+    def found(stiffness, own, seed):
+        spring = PlantedEffect(make_effect("parallel_spring", "pan"), np.array([stiffness, 0.15]))
+        recording = simulate(robot, series, periods=8, seed=seed, effects=[spring]).recording
+        bench = Bench(period_data(wide_processing(recording, robot, 5.0), robot), base_effects(robot))
+        start = settle(bench, bench.effects)
+        named = make_effect(own, "pan")
+        final = settle_again(bench, bench.fit((*start.fit.effects, named), start.noise, start=start.fit.parameters))
+        others = rivals(bench, Selection(start, final, 1, (1e-9,)))[len(start.fit.effects)]
+        return {a.effect for a in others}
+
+    assert "parallel_spring" not in found(0.0, "torque_offset", 1)
+    # where there is a stiffness, the constant alone is behind
+    assert "torque_offset" not in found(0.2, "parallel_spring", 1)

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.free_shapes import room
-from sea_ident.effects import make_effect
+from sea_ident.discrepancy.judge import slowest
+from sea_ident.effects import effect_from_dict, make_effect
 from sea_ident.effects.orders import highest_order, motors_too_fast, orders
 from sea_ident.effects.state import State
+from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.robot import load_robot
 
@@ -73,7 +75,8 @@ def test_the_highest_order_is_that_of_all_but_the_fastest_tenth(leg):
 @pytest.mark.filterwarnings("ignore:emps")
 @pytest.mark.parametrize("name", ["torque_ripple", "position_dependent_friction"])
 def test_a_fit_can_follow_every_wave_that_a_short_way_of_a_slide_shows_up_and_down(name):
-    slide = load_robot("emps")
+    with pytest.warns(SeaIdentWarning, match="no transmission"):
+        slide = load_robot("emps")
     time = 0.005 * np.arange(1000)
     way = 0.015 * np.sin(0.4 * np.pi * time)[:, None]
     state = State(slide, Motion.rigid(time, way, np.gradient(way, time, axis=0), np.zeros_like(way)))
@@ -82,3 +85,26 @@ def test_a_fit_can_follow_every_wave_that_a_short_way_of_a_slide_shows_up_and_do
     for one in variants:
         down, up = room(one, one.ranges[0])
         assert down < 0.0 < up
+
+
+@pytest.mark.parametrize("name", ["torque_ripple", "position_dependent_friction"])
+def test_a_wave_on_a_slide_is_no_straight_line_over_its_way(name):
+    """On a way of 0.2 m a wave of half an order per metre is a constant and a slope, which other effects are."""
+    with pytest.warns(SeaIdentWarning, match="no transmission"):
+        slide = load_robot("emps")
+    time = 0.005 * np.arange(2001)
+    q = 0.1 * np.sin(2.0 * np.pi * 0.2 * time)[:, None]
+    speed = np.gradient(q[:, 0], time)[:, None]
+    state = State(slide, Motion.rigid(time, q, speed, np.zeros_like(speed)))
+    tried = make_effect(name, "slider").variants(state)
+    assert min(each.order for each in tried) == pytest.approx(10.0)
+    assert {each.ranges[0].lower for each in tried} == {5.0}
+    assert slowest(replace(tried[0], order=5.05))
+    assert not slowest(tried[0])
+    # the range comes back from a file
+    assert effect_from_dict(tried[0].to_dict()).ranges == tried[0].ranges
+
+
+def test_a_joint_that_turns_keeps_the_order_of_its_turns(leg):
+    tried = make_effect("torque_ripple", "hip").variants(turning(leg, [0.01, 0.01, 0.01]))
+    assert {each.ranges[0].lower for each in tried} == {0.5}

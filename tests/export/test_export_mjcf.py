@@ -143,6 +143,15 @@ def test_what_mujoco_cannot_hold_is_told() -> None:
     assert notes == ["negative, so that the exported robot gains energy: hip viscous friction"]
 
 
+def test_how_much_a_link_lacks_for_its_rotor_is_told() -> None:
+    robot = load("exo_leg")
+    effects = effects_of(robot)
+    columns, psi = model_columns(robot, effects), identified(robot, effects)
+    psi[[column.name for column in columns].index("motor.rotor_inertia")] = 1.0
+    with pytest.raises(ExportError, match=r"it lacks 0\.9\d+ kg m2 .* Count the rotors into the <inertia> of this"):
+        mjcf_text(collect_values(robot, columns, psi))
+
+
 def test_missing_mujoco_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     values, _, _ = values_of(load("exo_leg"))
     monkeypatch.setitem(sys.modules, "mujoco", None)

@@ -253,6 +253,16 @@ def test_warnings_are_heard_and_kept() -> None:
         assert load_robot("exo_leg").warnings == ()
 
 
+@pytest.mark.parametrize(
+    ("axis", "end"), [("1 1 0.3", "a unit axis: 0.691714464 0.691714464 0.207514339"), ("0 0 0", "a unit axis")]
+)
+def test_an_axis_that_is_no_unit_axis_is_told_with_the_one_that_is(axis: str, end: str) -> None:
+    text = (robots_folder() / "exo_leg" / "exo_leg.urdf").read_text()
+    with pytest.raises(RobotError) as caught:
+        robot_from_text(text.replace('<axis xyz="0 -1 0"/>', f'<axis xyz="{axis}"/>', 1), "exo_leg.urdf")
+    assert str(caught.value).endswith(end)
+
+
 def test_every_error_is_of_one_family() -> None:
     assert issubclass(RobotError, SeaIdentError)
 

@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 
 from sea_ident import SeaIdentError
+from sea_ident.motion import Motion
+from sea_ident.robot import robot_from_text
 from sea_ident.simulation import FrictionJitter, SensorNoise, WarmUp, motor_current, plant_from_robot, simulate
 from sea_ident.simulation.sensors import noise
 
@@ -90,3 +92,48 @@ def test_impossible_sensors_are_refused(change, match):
 def test_wrong_number_of_sensors_is_refused(leg, leg_series):
     with pytest.raises(SeaIdentError, match="current has 2 values for 3 joints"):
         simulate(leg, leg_series, periods=1, sensors=SensorNoise(current=(0.1, 0.1)))
+
+
+FINGER = """<robot name="finger"><link name="palm"/>
+  <link name="slide"><inertial><mass value="0.05"/>
+    <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tip"><inertial><origin xyz="0.02 0 0"/><mass value="0.02"/>
+    <inertia ixx="1e-6" iyy="4e-6" izz="4e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="reach" type="prismatic"><parent link="palm"/><child link="slide"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="0.05" velocity="0.1" effort="4"/></joint>
+  <joint name="bend" type="revolute"><parent link="slide"/><child link="tip"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="1.5" velocity="5" effort="0.1"/></joint>
+  <transmission name="r" type="sea_ident/SeriesElastic"><joint name="reach"/><actuator name="rm">
+    <mechanicalReduction>2000</mechanicalReduction><torqueConstant>0.002</torqueConstant>
+    <rotorInertia>1e-9</rotorInertia><viscousFriction>0.5</viscousFriction><coulombFriction>0.1</coulombFriction>
+    </actuator>
+    <seriesElastic stiffness="900"/></transmission>
+  <transmission name="b" type="sea_ident/SeriesElastic"><joint name="bend"/><actuator name="bm">
+    <mechanicalReduction>64</mechanicalReduction><rotorInertia>2e-9</rotorInertia>
+    <viscousFriction>1e-4</viscousFriction><coulombFriction>4e-4</coulombFriction></actuator>
+    <seriesElastic stiffness="0.15"/></transmission></robot>"""
+
+
+def test_usual_sensors_suit_what_a_joint_may_bear_and_slides():
+    robot = robot_from_text(FINGER, "finger.urdf")
+    usual, found = SensorNoise(), SensorNoise.usual(robot)
+    assert found.motor_torque == pytest.approx((0.04, 0.001))
+    assert found.current == pytest.approx((0.04 / (2000 * 0.002), usual.current))
+    for name in ("link_position", "motor_position", "link_resolution", "motor_resolution"):
+        assert getattr(found, name) == pytest.approx((0.1 * getattr(usual, name), getattr(usual, name)))
+
+
+def test_a_finger_is_recorded_with_torque_that_tells_something():
+    robot = robot_from_text(FINGER, "finger.urdf")
+    still = np.zeros((200, 2))
+    rest = Motion.rigid(np.arange(200) * 0.005, still + np.array([0.02, 0.5]), still, still)
+    recording = simulate(robot, rest, seed=1, plant=plant_from_robot(robot)).recording
+    torque = recording.channel("tau_motor", ("bend",))
+    assert np.std(torque) == pytest.approx(0.001, rel=0.3)
+
+
+def test_usual_sensors_of_the_leg_are_those_of_no_robot_in_particular(leg):
+    usual, found = SensorNoise(), SensorNoise.usual(leg)
+    for name in ("link_position", "motor_position", "link_resolution", "motor_resolution", "current", "motor_torque"):
+        np.testing.assert_array_equal(found.per_joint(name, leg.n), usual.per_joint(name, leg.n))
+    assert found.spring_torque is None

@@ -174,6 +174,25 @@ def test_missing_rotor_inertia_is_named():
         plant_from_robot(load_robot("hebi_x5"))
 
 
+def test_a_rotor_without_inertia_is_not_called_left_out():
+    parts = '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0")
+    robot = from_parts(*parts, motor("swing", 'stiffness="100"').replace(">3e-5<", ">0<"))
+    with pytest.raises(SeaIdentError, match="states none, or zero, of swing: <rotorInertia>"):
+        plant_from_robot(robot)
+
+
+def test_friction_of_a_rigid_joint_is_not_called_absent_where_the_joint_states_it():
+    """As the exported URDF of an identified robot does; the motor of a spring has a friction of its own."""
+    dynamics = '<dynamics damping="0.06" friction="0.08"/>'
+    parts = '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0", dynamics)
+    plant = plant_from_robot(from_parts(*parts, motor("swing", None, "<!-- nothing -->")))
+    assert plant.viscous_friction == pytest.approx([0.06])
+    assert plant.coulomb_friction == pytest.approx([0.08])
+    assert not any("Friction" in note for note in plant.notes)
+    elastic = plant_from_robot(from_parts(*parts, motor("swing", 'stiffness="100"', "<!-- nothing -->")))
+    assert sum("Friction" in note for note in elastic.notes) == 2
+
+
 def test_what_is_not_stated_is_absent_and_said():
     """Only gear, rotor and stiffness: no motor of an annotated robot needs more to be simulated than a bare one."""
     robot = from_parts(
