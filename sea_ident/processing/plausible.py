@@ -39,7 +39,7 @@ TURN_WITHIN = 0.03
 """Deviation from one of them up to which it is recognised: a motion goes on within the sample [-]."""
 
 MOST_SLIPS = 3
-"""Steps of a deflection up to which they are lost counts."""
+"""Steps of a deflection up to which they are lost turns."""
 
 SPEED_SAMPLES = 10
 """Samples over which a speed is taken, so that noise of an encoder is none."""
@@ -302,16 +302,19 @@ def _jumps(time: FloatArray, values: FloatArray) -> NDArray[np.intp]:
 
 
 def _slip(time: FloatArray, joint: Joint, deflection: FloatArray) -> list[str]:
-    """Whether a deflection makes a step that is too small to be seen in the positions, as lost counts make."""
-    column = f"theta_{joint.name} - q_{joint.name}"
-    told = _jump(time, column, deflection, joint)
-    # play of a gear is crossed at every reversal, counts are lost now and then
-    if _jumps(time, deflection).size > MOST_SLIPS:
+    """Whether a deflection makes a step of whole turns of the motor, too small to be seen in the positions.
+
+    A step of another size may be a push, or play that is crossed.
+    """
+    if joint.actuator is None or joint.prismatic:
         return []
-    if not told or joint.actuator is None or joint.prismatic:
-        return told
     turn = 2.0 * np.pi / abs(joint.actuator.gear_ratio)
-    return [f"{told[0]} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
+    jumps = _jumps(time, deflection)
+    turns = np.abs(np.diff(deflection)[jumps]) / turn
+    if not 0 < jumps.size <= MOST_SLIPS or np.any((turns < 0.5) | (np.abs(turns - np.round(turns)) > TURN_WITHIN)):
+        return []
+    (told,) = _jump(time, f"theta_{joint.name} - q_{joint.name}", deflection, joint)
+    return [f"{told} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
 
 
 def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:

@@ -19,8 +19,9 @@ SAME = 0.03
 ALIKE = 0.9
 """Likeness of the two from which on there is a factor between them [-]."""
 
-SPIKE = 5.0
-"""Distance from the median of five samples, over that of 99 % of the samples, from which on one is a spike [-]."""
+SPIKE = 20.0
+"""Distance from the median of five samples, over that of 99 % of the samples, from which on one is a spike [-]. A push
+makes a controller answer by ten."""
 
 FEWEST_FOR_SPIKES = 200
 """Samples from which on spikes are looked for."""
