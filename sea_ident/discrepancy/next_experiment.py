@@ -16,14 +16,11 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.contribution import contribution
 from sea_ident.discrepancy.data import PeriodData, around_reversals
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Alternative, NextExperiment
-from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import free_shapes, is_signal
-from sea_ident.discrepancy.linear import solve, whiten
 from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.pairs import Pair, ambiguous_pairs, hardest, separation
 from sea_ident.discrepancy.search import Selection
 from sea_ident.effects import Effect, Side
 from sea_ident.estimation import Model
@@ -68,35 +65,6 @@ WORTHWHILE = 1.1
 """Gain below which a motion is no better than the one that was recorded."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """Two effects that explain a recording equally well.
-
-    Attributes:
-        own: the model with the one that was named.
-        own_position: of it among the effects.
-        rival: the model with the other.
-        rival_position: of it among the effects.
-    """
-
-    own: Fit
-    own_position: int
-    rival: Fit
-    rival_position: int
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Both, as `name at joint`."""
-        return self.own.effects[self.own_position].title, self.rival.effects[self.rival_position].title
-
-
-def ambiguous_pairs(selection: Selection, alternatives: dict[int, tuple[Alternative, ...]]) -> list[Pair]:
-    """The named effect that is the hardest to tell, with all its alternatives, the most similar first."""
-    found = [(a.cos2, position, a.fit) for position, own in alternatives.items() for a in own if a.fit is not None]
-    found.sort(key=lambda each: -each[0])
-    return [Pair(selection.final.fit, k, fit, k) for _, k, fit in found if k == found[0][1]]
-
-
 def propose(
     bench: Bench, noise: NoiseFloor, pairs: Sequence[Pair], model: Model
 ) -> tuple[NextExperiment | None, tuple[str, ...]]:
@@ -113,18 +81,22 @@ def propose(
     """
     now = [separation(bench, noise, pair) for pair in pairs]
     first, second = pairs[0].names
-    design = _Design(bench, noise, pairs, *_identified(model))
-    shown, reasons = _shown(design, _plans(model.robot, pairs[0]), lambda each: min(each.energies) > PLENTY)
+    forms = [(pair, hardest(bench, noise, pair)) for pair in pairs]
+    design = _Design(bench, noise, forms, *_identified(model))
+    plans = _plans(model.robot, forms[0][1])
+    shown, reasons = _shown(design, plans, lambda each: min(each.told_by) > PLENTY)
     if shown and model.robot.elastic_indices.size:
         # to keep links inside where their springs take them takes longer than a design: the best alone, as long as it
         # still tells what one of them did
+        untried = plans[len(shown) + len(reasons) :]
         shown.sort(key=lambda each: -each.score)
         most = max(len(each.told(now)) for each in shown)
-        plans = [replace(each.plan, begun=each.excitation) for each in shown]
+        plans = [replace(each.plan, kept=True, begun=each.excitation) for each in shown]
+        plans += [replace(plan, kept=True) for plan in untried]
         shown, reasons = _shown(design, plans, lambda each: len(each.told(now)) >= most)
     if not shown:
         return None, (f"no next experiment was designed for {first} against {second}: {'; '.join(reasons)}",)
-    best = max(shown, key=lambda each: each.score)
+    best = max(shown, key=lambda each: (len(each.told(now)), each.score))
     told = best.told(now)
     untold = [pairs[k].names[1] for k in range(len(pairs)) if k not in told]
     notes = (f"of the motions that were tried inside the limits none tells {first} from {', '.join(untold)}",)
@@ -132,34 +104,6 @@ def propose(
         return None, notes
     gain = best.gains(now)[told[0]]
     return NextExperiment(pairs[told[0]].names, best.excitation.to_dict(), gain), notes if untold else ()
-
-
-def separation(bench: Bench, noise: NoiseFloor, pair: Pair) -> float:
-    """Energy of one effect that the model with the other leaves, in units of the noise; the smaller of both ways."""
-    one = _left(bench, noise, pair.own, pair.own_position, pair.rival)
-    other = _left(bench, noise, pair.rival, pair.rival_position, pair.own)
-    return min(one, other)
-
-
-def _left(bench: Bench, noise: NoiseFloor, truth: Fit, position: int, against: Fit) -> float:
-    """Energy of an effect of one model outside all that another can follow."""
-    whitener, free = bench.whitener(noise), bench.freed(noise)
-    directions = bench.design(against.effects)
-    shapes = free_shapes(against.effects)
-    if shapes:
-        bent, _ = bench.tangents(against.effects, against.columns, against.values, shapes)
-        directions = np.concatenate([directions, bent], axis=2)
-    flat = free.off(whiten(whitener, directions))
-    basis = solve(flat, np.zeros(len(flat)))[1]
-    if is_signal(truth.effects[position]):
-        others = [e for k, e in enumerate(truth.effects) if k != position]
-        with_it, without = (bench.predicted(effects, truth.parameters) for effects in (truth.effects, others))
-        torque = without.residual - with_it.residual
-    else:
-        torque = contribution(bench, truth, [position])
-    signal = free.off(whiten(whitener, torque))
-    signal = signal - basis @ (basis.T @ signal)
-    return float(signal @ signal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,13 +115,15 @@ class _Plan:
         effects: whose columns it is to show; all usual ones where None.
         springs: whether springs are among them.
         seed: of the starts.
-        begun: a design for links as planned, whose links are to be kept inside; None for a new one.
+        kept: whether links are to be kept inside where their springs take them.
+        begun: a design for links as planned to begin with; None for a new one.
     """
 
     criterion: Criterion
     effects: tuple[Effect, ...] | None
     springs: bool
     seed: int
+    kept: bool = False
     begun: Excitation | None = None
 
 
@@ -188,25 +134,30 @@ class _Shown:
     Attributes:
         plan: what it was designed for.
         excitation: the motion.
-        energies: what every effect leaves of its rival, in units of the noise.
+        energies: what every effect leaves of its rival, in units of the noise: as found, and in the hardest form.
     """
 
     plan: _Plan
     excitation: Excitation
-    energies: list[float]
+    energies: list[tuple[float, float]]
 
     @property
     def score(self) -> float:
-        """Larger is better."""
-        return float(np.sum(np.log(np.maximum(self.energies, 1.0))))
+        """Larger is better: of the forms that were found, as what is hardest is often told by none."""
+        return float(sum(np.log(max(found, 1.0)) for found, _ in self.energies))
+
+    @property
+    def told_by(self) -> list[float]:
+        """What tells every pair in any form, in units of the noise."""
+        return [min(forms) for forms in self.energies]
 
     def gains(self, now: Sequence[float]) -> list[float]:
         """How much more it shows of every pair than a recording of which the same is known [-]."""
-        return [float(np.sqrt(new / max(old, 1.0))) for new, old in zip(self.energies, now, strict=True)]
+        return [float(np.sqrt(new / max(old, 1.0))) for new, old in zip(self.told_by, now, strict=True)]
 
     def told(self, now: Sequence[float]) -> list[int]:
         """Which pairs it tells apart, and better than that recording."""
-        better = enumerate(zip(self.energies, self.gains(now), strict=True))
+        better = enumerate(zip(self.told_by, self.gains(now), strict=True))
         return [k for k, (energy, gain) in better if energy >= SMALLEST_ENERGY and gain >= WORTHWHILE]
 
 
@@ -249,14 +200,14 @@ class _Design:
     Attributes:
         bench: the recording that does not.
         noise: its noise floor.
-        pairs: the effect with each alternative.
+        pairs: the effect with each alternative, as found and in the hardest form.
         robot: with the bodies that were identified.
         motors: where they are, in a motion of the links.
     """
 
     bench: Bench
     noise: NoiseFloor
-    pairs: Sequence[Pair]
+    pairs: Sequence[tuple[Pair, Pair]]
     robot: Robot
     motors: PredictedMotors | None
 
@@ -282,7 +233,7 @@ class _Design:
                     criterion=plan.criterion,
                     effects=plan.effects,
                     motors=self.motors if plan.springs else None,
-                    links=LinksAsPlanned() if plan.begun is None else self.links,
+                    links=self.links if plan.kept else LinksAsPlanned(),
                     tolerance_factor=TOLERANCE_FACTOR,
                     noise=_row_noise(bench, self.noise) if plan.springs else None,
                     rate=_rate(bench),
@@ -293,7 +244,11 @@ class _Design:
         if plan.begun is not None:
             excitation = replace(excitation, starts=plan.begun.starts, start_values=plan.begun.start_values)
         there = Bench(_data_of(bench.data, self.robot, excitation.series, self.motors), bench.effects)
-        return _Shown(plan, excitation, [separation(there, self.noise, pair) for pair in self.pairs])
+        energies = []
+        for found, hard in self.pairs:
+            energy = separation(there, self.noise, found)
+            energies.append((energy, energy if hard is found else separation(there, self.noise, hard)))
+        return _Shown(plan, excitation, energies)
 
 
 def _rate(bench: Bench) -> float:

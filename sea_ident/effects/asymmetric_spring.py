@@ -66,6 +66,16 @@ class AsymmetricSpring(SpringEffect):
             *(replace(self, exponent=1.0, kink=kink) for kink in kinks if low < kink < high),
         )
 
+    def same_here(self, state: State) -> tuple["AsymmetricSpring", ...]:
+        """Kinks nearer to rest, where the motion deflects to one side only and does not pass its own."""
+        deflection = state.motion.deflection[:, state.robot.index(self.required_joint)]
+        least = float(deflection[np.argmin(np.abs(deflection))])
+        one_sided = float(deflection.min()) * float(deflection.max()) > 0.0
+        if self.exponent != 1.0 or not one_sided or not 0.0 < self.kink / least < 1.0:
+            return ()
+        kinks = (share * least for share in OUT_OF_REACH)
+        return tuple(replace(self, kink=kink) for kink in kinks if abs(kink) < abs(self.kink))
+
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
         """Whether a spring of two straight sides pushes back on both."""
         stiffness = parameters.get(f"{self.joint}.spring_stiffness", 0.0)

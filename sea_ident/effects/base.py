@@ -207,6 +207,13 @@ class Effect(ABC):
         """
         return None
 
+    def same_here(self, state: State) -> tuple[Self, ...]:
+        """Other forms of the effect that do the same on this motion, those that other motions tell least at the end.
+
+        By default there are none.
+        """
+        return ()
+
     def beginnings(self) -> tuple[Self, ...]:
         """The same effect with other shapes or amounts, from which a fit begins too; by default none.
 

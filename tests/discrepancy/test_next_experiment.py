@@ -130,10 +130,10 @@ def test_links_are_kept_inside_for_the_best_motion_unless_it_then_tells_nothing(
     asked = []
 
     def designed(plan):
-        if plan.begun is not None:
+        if plan.kept:
             asked.append(plan.seed)
         excitation = SimpleNamespace(series=None, to_dict=lambda: {"seed": plan.seed})
-        return _Shown(plan, excitation, [energies[plan.seed][plan.begun is not None]])
+        return _Shown(plan, excitation, [2 * (energies[plan.seed][plan.kept],)])
 
     plans = [_Plan(DOptimality(), None, springs=False, seed=seed) for seed in (1, 2, 3)]
     monkeypatch.setattr(next_experiment, "_plans", lambda *_: plans)

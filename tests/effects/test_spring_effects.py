@@ -79,6 +79,24 @@ def test_a_kink_that_is_not_passed_is_an_offset_and_a_stiffer_spring(sign):
     np.testing.assert_allclose(column, sign * state.motion.deflection[:, 1] - 0.02, rtol=1e-9)
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_kinks_nearer_to_rest_do_the_same_where_the_motion_is_on_one_side(sign):
+    leg = load_robot("exo_leg")
+    motion = random_motion(leg, samples=200, seed=4)
+    theta = motion.q + sign * (0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None])
+    state = State(leg, replace(motion, theta=theta))
+
+    def alike(spring, where=state):
+        return [each.kink for each in spring.same_here(where)]
+
+    spring = make_effect("asymmetric_spring", "knee", kink=0.018 * sign)
+    np.testing.assert_allclose(alike(spring), sign * 0.02 * np.array([0.45, 0.225, 0.1125]), rtol=1e-3)
+    # passed, beyond rest, curved, or a motion of both sides
+    assert alike(replace(spring, kink=0.022 * sign)) == alike(replace(spring, kink=-0.01 * sign)) == []
+    assert alike(replace(spring, exponent=2.0)) == alike(spring, State(leg, motion)) == []
+    assert make_effect("spring_offset", "knee").same_here(state) == ()
+
+
 def test_a_spring_of_two_straight_sides_pushes_back_on_both():
     spring = make_effect("asymmetric_spring", "knee", kink=0.01)
     assert spring.plausible(np.array([150.0]), {"knee.spring_stiffness": 200.0})
