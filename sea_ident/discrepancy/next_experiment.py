@@ -213,9 +213,12 @@ class _Design:
 
     @property
     def links(self) -> LinksInside | None:
-        """Links are to be kept inside wherever it can be computed where the springs take them."""
+        """Links are to be kept inside wherever it can be computed where the springs take them.
+
+        Without a reserve, as in other designs: what tells effects apart is often at the end of a range.
+        """
         joints = (self.robot.joint_names[int(i)] for i in self.robot.elastic_indices)
-        return LinksInside() if all(self.robot.spring(joint).stiffness for joint in joints) else None
+        return LinksInside(reserve=0.0) if all(self.robot.spring(joint).stiffness for joint in joints) else None
 
     def __call__(self, plan: _Plan) -> _Shown | str:
         """The motion of a plan and what it shows of every pair; why there is none, where there is none."""
