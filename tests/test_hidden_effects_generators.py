@@ -271,6 +271,23 @@ def test_cases_follow_from_their_seed_and_survive_json() -> None:
     assert Case.from_dict(case.to_dict()) == case
 
 
+def test_a_small_effect_that_the_engine_cannot_follow_is_drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = draw_case(11, "one_small", 0).planted[0]
+    measure, asked = gap.Gauge.measure, list[Planted]()
+
+    def diverges_once(gauge: gap.Gauge, planted: Planted) -> Planted:
+        # the last size that is measured is the small one
+        if planted.effect == usual.effect and planted.size == usual.size and not asked:
+            asked.append(planted)
+            raise FloatingPointError
+        return measure(gauge, planted)
+
+    monkeypatch.setattr(gap.Gauge, "measure", diverges_once)
+    other = draw_case(11, "one_small", 0).planted[0]
+    assert asked
+    assert (other.effect, other.joint, other.size) != (usual.effect, usual.joint, usual.size)
+
+
 def test_coarse_encoders_have_steps_far_above_their_noise_and_half_the_cases_hide_nothing() -> None:
     cases = [draw_case(11, "coarse", k) for k in range(6)]
     assert [len(case.planted) for case in cases] == [0, 1, 0, 1, 0, 1]
