@@ -40,6 +40,7 @@ def test_everything_asked_for_is_there(written):
     assert sorted(p.name for p in (folder / "bag").iterdir()) == ["bag.db3", "metadata.yaml"]
 
 
+@pytest.mark.scenario
 def test_where_springs_take_the_links(written, tmp_path):
     """Told with the result, and kept inside where that is asked for."""
     _, record = written

@@ -121,6 +121,7 @@ ENERGIES = {1: (50.0, 40.0), 2: (60.0, 5.0), 3: (70.0, 60.0)}
 """By seed, of a motion as it is planned and with its links inside."""
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("kept_by_three", "kept"), [(60.0, [3]), (5.0, [3, 2, 1])])
 def test_links_are_kept_inside_for_the_best_motion_unless_it_then_tells_nothing(
     monkeypatch, offset, kept_by_three, kept

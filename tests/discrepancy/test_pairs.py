@@ -34,6 +34,7 @@ def one_sided(laboratory):
     return bench, settled.noise, Pair(fits[0], len(bench.effects), fits[1], len(bench.effects)), least
 
 
+@pytest.mark.scenario
 def test_a_kink_out_of_reach_is_taken_where_other_motions_pass_it_least(one_sided):
     bench, noise, pair, least = one_sided
     found = hardest(bench, noise, pair)
@@ -45,6 +46,7 @@ def test_a_kink_out_of_reach_is_taken_where_other_motions_pass_it_least(one_side
     assert separation(bench, noise, found) == pytest.approx(separation(bench, noise, pair), abs=1e-3)
 
 
+@pytest.mark.scenario
 def test_a_motion_that_stays_on_one_side_of_rest_is_not_promised_to_tell(one_sided, laboratory):
     """It passes the kink that was found, but not one nearer to rest."""
     bench, noise, pair, least = one_sided

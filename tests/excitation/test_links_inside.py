@@ -24,6 +24,7 @@ def kept(arm):
         return design_excitation(arm, **SMALL)
 
 
+@pytest.mark.scenario
 def test_limits_of_a_soft_arm_hold_in_simulation(arm, kept):
     """Between the samples of the design too, with motors that follow closely.
 
@@ -70,6 +71,7 @@ def test_stiff_springs_change_nothing_and_nothing_is_said():
     assert stiff.link_margins["elbow.acceleration"] == pytest.approx(rigid.margins["elbow.acceleration"], abs=0.05)
 
 
+@pytest.mark.scenario
 def test_links_that_sag_are_told_and_kept_where_that_is_asked_for(robot_of, tmp_path):
     """The harmonics stay away from the resonance: the design is the one for theta = q, and what it costs is said."""
     leg = robot_of("exo_leg")
