@@ -271,6 +271,7 @@ def test_cases_follow_from_their_seed_and_survive_json() -> None:
     assert Case.from_dict(case.to_dict()) == case
 
 
+@pytest.mark.scenario
 def test_a_small_effect_that_the_engine_cannot_follow_is_drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     usual = draw_case(11, "one_small", 0).planted[0]
     measure, asked = gap.Gauge.measure, list[Planted]()
@@ -288,6 +289,7 @@ def test_a_small_effect_that_the_engine_cannot_follow_is_drawn_anew(monkeypatch:
     assert (other.effect, other.joint, other.size) != (usual.effect, usual.joint, usual.size)
 
 
+@pytest.mark.scenario
 def test_coarse_encoders_have_steps_far_above_their_noise_and_half_the_cases_hide_nothing() -> None:
     cases = [draw_case(11, "coarse", k) for k in range(6)]
     assert [len(case.planted) for case in cases] == [0, 1, 0, 1, 0, 1]
@@ -302,6 +304,7 @@ def test_coarse_encoders_have_steps_far_above_their_noise_and_half_the_cases_hid
     assert fine.link_step < 2.0 * fine.link_encoder
 
 
+@pytest.mark.scenario
 def test_other_robots_take_turns_with_and_without_something_hidden() -> None:
     cases = [draw_case(11, "others", k) for k in range(6)]
     assert [(case.robot, len(case.planted)) for case in cases] == [

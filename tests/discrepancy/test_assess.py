@@ -301,6 +301,7 @@ def test_an_effect_is_found_about_the_smallest_size_and_not_far_below(laboratory
     assert named(0.3) == []
 
 
+@pytest.mark.scenario
 def test_a_constant_is_not_taken_for_a_spring_whose_stiffness_the_data_do_not_ask_for():
     """A rigid joint feels a spring across it as the same constant, with a column more: no motion would tell them."""
     robot = sea_ident.robot.robot_from_text(

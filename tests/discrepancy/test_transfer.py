@@ -89,6 +89,7 @@ def test_what_explains_less_than_is_missing_beside_it_is_not_ruled_out_by_half(s
     assert not Transfer(share, False, excess=excess, possible=possible).ruled_out
 
 
+@pytest.mark.scenario
 def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory, monkeypatch):
     """To second order: an offset of 4 that is said to be 1 leaves nine sixteenths of what it explains."""
     ripple = ("torque_ripple", "hip", [0.4, 0.0], {"order": 24.0})

@@ -208,6 +208,7 @@ def test_what_is_not_stated_is_absent_and_said():
     assert run.tau_spring == pytest.approx(100.0 * run.motion.deflection, abs=1e-9)
 
 
+@pytest.mark.scenario
 def test_friction_does_not_hold_a_small_slide_back():
     """A gripper: centimetres of motion, little inertia, and friction that outweighs what the usual gains give."""
     robot = from_parts(
