@@ -154,7 +154,7 @@ def close_gap(
         if diagnosis.verdict is Verdict.AMBIGUOUS and diagnosis.model is not None:
             unsure = ", ".join(sorted(m.title for m in diagnosis.missing if m.alternatives))
             notes.append(
-                f"nothing was added, as other effects explain the data as well as {unsure}; the model of the last "
+                f"nothing more was added, as other effects explain the data as well as {unsure}; the model of the last "
                 "diagnosis, rounds[-1].model, has what it names and predicts such motion as well"
             )
         if diagnosis.verdict not in NAMED or found <= known:

@@ -82,8 +82,8 @@ def design_excitation(
             be given: links first, then motors.
         start: (n, 2 L + 1) coefficients of a further start; it is moved inside the limits if it is outside.
         ramp: ask for ramps between rest and the periodic motion, inside the same limits; none by default.
-        tolerance_factor: on the gains of the criterion that are too small to go on for [-]. With 100 a design takes a
-            third of the time and is about 0.5 lower in log det.
+        tolerance_factor: on the gains of the criterion that are too small to go on for [-]; with a larger one a design
+            ends earlier, and a little lower.
         jobs: starts that are climbed at the same time, -1 for one per core; the result does not depend on it.
         progress: called after every step.
 

@@ -69,22 +69,26 @@ def test_a_spring_with_two_sides_rests_without_torque_wherever_its_kink_is(kink,
     assert column[2] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_kink_that_is_not_passed_is_an_offset_and_a_stiffer_spring(sign):
+def on_one_side(sign):
+    """Springs that are deflected by 0.02 to 0.03 rad of one sign."""
     leg = load_robot("exo_leg")
     motion = random_motion(leg, samples=200, seed=4)
     theta = motion.q + sign * (0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None])
-    state = State(leg, replace(motion, theta=theta))
+    return State(leg, replace(motion, theta=theta))
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_kink_that_is_not_passed_is_an_offset_and_a_stiffer_spring(sign):
+    state = on_one_side(sign)
     column = make_effect("asymmetric_spring", "knee", kink=0.01 * sign).evaluate(state).motor[:, 1, 0]
     np.testing.assert_allclose(column, sign * state.motion.deflection[:, 1] - 0.02, rtol=1e-9)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_kinks_nearer_to_rest_do_the_same_where_the_motion_is_on_one_side(sign):
-    leg = load_robot("exo_leg")
-    motion = random_motion(leg, samples=200, seed=4)
-    theta = motion.q + sign * (0.025 + 0.005 * np.sin(np.linspace(0.0, 2.0 * np.pi, 200))[:, None])
-    state = State(leg, replace(motion, theta=theta))
+    state = on_one_side(sign)
+
+    both_sides = State(state.robot, random_motion(state.robot, samples=200, seed=4))
 
     def alike(spring, where=state):
         return [each.kink for each in spring.same_here(where)]
@@ -93,7 +97,7 @@ def test_kinks_nearer_to_rest_do_the_same_where_the_motion_is_on_one_side(sign):
     np.testing.assert_allclose(alike(spring), sign * 0.02 * np.array([0.45, 0.225, 0.1125]), rtol=1e-3)
     # passed, beyond rest, curved, or a motion of both sides
     assert alike(replace(spring, kink=0.022 * sign)) == alike(replace(spring, kink=-0.01 * sign)) == []
-    assert alike(replace(spring, exponent=2.0)) == alike(spring, State(leg, motion)) == []
+    assert alike(replace(spring, exponent=2.0)) == alike(spring, both_sides) == []
     assert make_effect("spring_offset", "knee").same_here(state) == ()
 
 
