@@ -170,6 +170,7 @@ def test_what_is_ambiguous_is_not_added_and_it_is_said_which_model_has_it(models
     assert closed.model is models[0]
     assert closed.added == ()
     assert len(closed.warnings) == 1
+    assert closed.warnings[0].startswith("nothing more was added")
     assert "explain the data as well as spring_offset at knee; the model of the last diagnosis" in closed.warnings[0]
 
 
