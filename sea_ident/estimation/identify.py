@@ -178,6 +178,14 @@ def _doubts(model: Model) -> list[str]:
     found = [*unseparated_friction(model.base, model.values, model.uncertainty)]
     found.extend(f"spring of {s.joint}: {s.note}" for s in model.springs if s.verdict in UNSAFE)
     found.extend(text for text in (spring.doubt() for spring in model.springs) if text is not None)
+    found.extend(
+        f"spring of {s.joint}: {t.effect.name} never slips in this motion, all of it or a part: that part is told from "
+        "the stiffness by where it rests alone, which the motion does not show. Standard deviations count all of it; "
+        "excite this joint more"
+        for s in model.springs
+        for t in s.terms
+        if t.by_rest
+    )
     found.extend(doubts_of_springs(model.robot, model.springs))
     return found
 

@@ -266,7 +266,12 @@ def _spring_to_dict(spring: SpringResult) -> dict[str, Any]:
     if spring.terms:
         more = {
             "terms": [
-                {"effect": term.effect.to_dict(), "values": list(term.values), "stds": list(term.stds)}
+                {
+                    "effect": term.effect.to_dict(),
+                    "values": list(term.values),
+                    "stds": list(term.stds),
+                    "by_rest": term.by_rest,
+                }
                 for term in spring.terms
             ],
             "full_covariance": [list(row) for row in spring.full_covariance],
@@ -330,7 +335,7 @@ def _term_from_dict(record: Mapping[str, Any], joint: str, robot: Robot) -> Spri
     count = len(effect.columns(robot))
     where = f"springs.{joint}.{effect.name}"
     values, stds = (_array(record[key], (count,), f"{where}.{key}") for key in ("values", "stds"))
-    return SpringTerm(effect, tuple(values.tolist()), tuple(stds.tolist()))
+    return SpringTerm(effect, tuple(values.tolist()), tuple(stds.tolist()), record.get("by_rest") is True)
 
 
 def _update_to_dict(update: Update) -> dict[str, Any]:

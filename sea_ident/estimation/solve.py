@@ -83,3 +83,13 @@ def solve_triangle(upper: FloatArray) -> Solution:
 def condition_number(triangle: FloatArray) -> float:
     """Condition number of the column-normalised regressor from its triangular factor (paper, II.B)."""
     return float(np.linalg.cond(triangle / np.linalg.norm(triangle, axis=0)))
+
+
+def solve_across(gram: FloatArray, side: FloatArray, nothing: FloatArray) -> FloatArray:
+    """(c, ...) the solution of products (c, c) that has no part in directions (c, k) that these say nothing of."""
+    if not nothing.size:
+        return np.asarray(np.linalg.solve(gram, side), dtype=np.float64)
+    across = np.eye(len(gram)) - nothing @ nothing.T
+    # a product of one in these directions keeps the rest as it is
+    found = across @ np.linalg.solve(across @ gram @ across + nothing @ nothing.T, across @ side)
+    return np.asarray(found, dtype=np.float64)

@@ -15,11 +15,14 @@ class SpringTerm:
         effect: the effect, with its shape.
         values: (k,) values of its columns.
         stds: (k,) their standard deviations, its shape held.
+        by_rest: whether only where it is at rest tells some of it from the law of the spring, as of dry friction that
+            never slips: the standard deviations of both count all of that.
     """
 
     effect: Effect
     values: tuple[float, ...]
     stds: tuple[float, ...]
+    by_rest: bool = False
 
 
 class Verdict(StrEnum):

@@ -5,14 +5,17 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.period_scores import period_scores
+from sea_ident.estimation.solve import solve_across
 from sea_ident.estimation.spring_misfit import spring_misfit
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
+from sea_ident.estimation.spring_untold import told_by_rest, untold
 from sea_ident.estimation.spring_verdict import held_out_rms, verdict_of
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError
@@ -23,12 +26,6 @@ from sea_ident.processing.harmonics import differentiate
 
 if TYPE_CHECKING:
     from sea_ident.estimation.model import Model
-
-ROUNDING = 1e-14
-"""Smallest to largest eigenvalue of normalised products below which columns are the same but for rounding."""
-
-SHARE = 0.1
-"""Part of a column in the combination that vanishes from which on it is named as one of the same [-]."""
 
 
 @one_thread
@@ -172,6 +169,12 @@ class _SpringData:
         """(N, 3 + k) columns of K1, K3, D and of the other effects."""
         return spring_columns(motion, self.joint, zero, self.effects)
 
+    @property
+    def owners(self) -> list[str]:
+        """What each column belongs to, in words."""
+        own = [e.name for e, width in zip(self.effects, self.widths, strict=True) for _ in range(width)]
+        return ["the stiffness", "the cubic stiffness", "the damping", *own, "the zero of the encoders"]
+
     def left_in_periods(self, values: FloatArray, zero: float) -> FloatArray | None:
         """(P, N) what values (3 + k,) leave of the torque of every period; None without periods."""
         if self.per_period is None:
@@ -243,6 +246,8 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         misfit = spring_misfit(left, law_inverse, whole, data.rows, data.uncertainty, data.harmonics, repeated)
         if misfit.covariance is not None:
             full = full + misfit.covariance
+    at_rest = told_by_rest(whole, law_values)
+    full = full + at_rest @ at_rest.T
     law, covariance = values[:3], full[:3, :3]
     freedom = data.uncertainty.degrees_of_freedom
     std = np.sqrt(np.maximum(np.diag(full), 0.0))
@@ -270,7 +275,7 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         largest_deflection=float(np.abs(columns[:, 0]).max()),
         held_out=held_out,
         note=note,
-        terms=_terms(data, values, std),
+        terms=_terms(data, values, std, np.any(at_rest != 0.0, axis=1)),
         full_covariance=_rows(full) if data.effects else (),
         noise=None if misfit is None else misfit.noise,
         misfit=() if misfit is None or misfit.covariance is None else _rows(misfit.covariance[:3, :3]),
@@ -281,13 +286,16 @@ def _rows(table: FloatArray) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(v) for v in row) for row in table)
 
 
-def _terms(data: _SpringData, values: FloatArray, std: FloatArray) -> tuple[SpringTerm, ...]:
+def _terms(
+    data: _SpringData, values: FloatArray, std: FloatArray, by_rest: NDArray[np.bool_]
+) -> tuple[SpringTerm, ...]:
     """The effects beyond the law with their values, from those of all columns."""
     found, start = [], 3
     for effect, width in zip(data.effects, data.widths, strict=True):
-        stop = start + width
-        found.append(SpringTerm(effect, tuple(map(float, values[start:stop])), tuple(map(float, std[start:stop]))))
-        start = stop
+        own = slice(start, start + width)
+        numbers = tuple(map(float, values[own])), tuple(map(float, std[own]))
+        found.append(SpringTerm(effect, *numbers, by_rest=bool(np.any(by_rest[own]))))
+        start += width
     return tuple(found)
 
 
@@ -309,45 +317,29 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     design = np.column_stack([data.columns(data.motion, zero), extra])
     norms = np.linalg.norm(design, axis=0)
     if data.per_period is None:
-        if data.harmonics:
-            instruments = data.answered(design / norms)
-            inverse = np.linalg.solve(instruments.T @ (design / norms), instruments.T) / norms[:, None]
-        else:
-            inverse = np.linalg.pinv(design / norms) / norms[:, None]
-        return inverse @ data.tau, inverse
-    periods = len(data.per_period)
-    tables = [np.column_stack([data.columns(motion, zero), extra]) / norms for motion, _ in data.per_period]
-    torques = [tau for _, tau in data.per_period]
-    parts = [data.answered(table) for table in tables]
-    table, torque = sum(tables) / periods, sum(torques) / periods
-    instruments = np.asarray(sum(parts) / periods, dtype=np.float64)
-    own = sum(z.T @ t for z, t in zip(parts, tables, strict=True)) / periods
-    side = sum(z.T @ tau for z, tau in zip(parts, torques, strict=True)) / periods
-    gram = (periods * instruments.T @ table - own) / (periods - 1.0)
-    if np.linalg.cond(gram) > 1e12:
-        gram, side = instruments.T @ table, instruments.T @ torque
-        _tell_apart(data, table.T @ table)
+        unit = design / norms
+        nothing = untold(data.name, unit.T @ unit, data.owners)
+        instruments = data.answered(unit) if data.harmonics else unit
+        inverse = solve_across(instruments.T @ unit, instruments.T, nothing)
+        values = inverse @ data.tau
     else:
-        side = (periods * instruments.T @ torque - side) / (periods - 1.0)
-    values = np.linalg.solve(gram, side) / norms
-    return values, np.linalg.solve(gram, instruments.T) / norms[:, None]
-
-
-def _tell_apart(data: _SpringData, gram: FloatArray) -> None:
-    """Raise where columns of unit length with these products (c, c) are the same but for rounding."""
-    strength, directions = np.linalg.eigh(gram)
-    if strength[0] > ROUNDING * strength[-1]:
-        return
-    owners = ["the stiffness", "the cubic stiffness", "the damping"]
-    for effect, width in zip(data.effects, data.widths, strict=True):
-        owners.extend([effect.name] * width)
-    owners.append("the zero of the encoders")
-    alike = list(dict.fromkeys(owners[k] for k in np.flatnonzero(np.abs(directions[:, 0]) > SHARE)))
-    what = " and ".join(alike) if len(alike) > 1 else f"the parameters of {alike[0]}"
-    raise IdentificationError(
-        f"joint {data.name!r}: this motion does not tell {what} of its spring apart; leave one effect out, or excite "
-        "this joint more"
-    )
+        periods = len(data.per_period)
+        tables = [np.column_stack([data.columns(motion, zero), extra]) / norms for motion, _ in data.per_period]
+        torques = [tau for _, tau in data.per_period]
+        parts = [data.answered(table) for table in tables]
+        table, torque = sum(tables) / periods, sum(torques) / periods
+        instruments = np.asarray(sum(parts) / periods, dtype=np.float64)
+        own = sum(z.T @ t for z, t in zip(parts, tables, strict=True)) / periods
+        side = sum(z.T @ tau for z, tau in zip(parts, torques, strict=True)) / periods
+        gram = (periods * instruments.T @ table - own) / (periods - 1.0)
+        nothing = np.zeros((len(gram), 0))
+        if np.linalg.cond(gram) > 1e12:
+            gram, side = instruments.T @ table, instruments.T @ torque
+            nothing = untold(data.name, table.T @ table, data.owners)
+        else:
+            side = (periods * instruments.T @ torque - side) / (periods - 1.0)
+        values, inverse = solve_across(gram, side, nothing), solve_across(gram, instruments.T, nothing)
+    return values / norms, inverse / norms[:, None]
 
 
 def _covariance(data: _SpringData, inverse: FloatArray, left: FloatArray | None, residual: FloatArray) -> FloatArray:

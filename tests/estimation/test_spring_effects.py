@@ -163,3 +163,30 @@ def test_springs_identified_again_keep_them(leg, model, recording):
 def test_the_law_of_the_spring_and_its_drift_are_not_to_be_given(leg, recording, name):
     with pytest.raises(IdentificationError, match="leave it out"):
         identify(leg, recording, effects=(*base_effects(leg), make_effect(name, "knee")), period=leg_series().period)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("slip", [0.03, 0.5])
+def test_dry_friction_that_never_slips_is_told_by_its_rest_alone(leg, tmp_path, slip):
+    """Where it rests is from before the recording: all that the model takes it for may be stiffness."""
+    element = make_effect("spring_hysteresis", "knee", slip=slip)
+    truth = PlantedEffect(element, np.array([3.0, 9.0]))
+    period = leg_series().period
+    recording = simulate(leg, leg_series(), periods=8, seed=3, effects=(truth,)).recording
+    with pytest.warns(SeaIdentWarning, match="spring of knee: spring_hysteresis never slips in this motion"):
+        found = identify(leg, recording, effects=(*base_effects(leg), element), period=period)
+    knee = found.springs[1]
+    stiffness = leg.spring("knee").stiffness
+    assert abs(knee.stiffness - stiffness) < 2.0 * knee.stiffness_std
+    values, stds = knee.terms[0].values, knee.terms[0].stds
+    assert all(abs(value - true) < 2.0 * std for value, true, std in zip(values, (3.0, 9.0), stds, strict=True))
+    # together they are as stiff as the truth, and that is known well
+    slope = np.array([1.0, 0.0, 0.0, 1.0 / slip, 1.0 / (3.0 * slip)])
+    whole, std = slope @ [*knee.law, *values], float(np.sqrt(slope @ np.array(knee.full_covariance) @ slope))
+    assert abs(whole - (stiffness + 3.0 / slip + 3.0 / slip)) < 4.0 * std < 0.02 * whole
+    found.save(tmp_path / "m.json")
+    assert read_model(tmp_path / "m.json").springs[1].terms[0].by_rest
+
+
+def test_what_slips_is_not_told_by_its_rest(model):
+    assert not any(t.by_rest for spring in model.springs for t in spring.terms)
