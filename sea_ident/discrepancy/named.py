@@ -15,6 +15,10 @@ from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.uncertainty import uncertainties
+from sea_ident.effects import Effect, Side
+from sea_ident.effects.memory import MemoryEffect
+from sea_ident.estimation.spring_untold import told_by_rest
+from sea_ident.estimation.springs import spring_columns
 
 
 def named_effects(
@@ -65,9 +69,10 @@ def named_effect(
     effect, counts = fit.effects[position], bench.counts(fit.effects)
     own = range(sum(counts[:position]), sum(counts[: position + 1]))
     seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
+    by_rest = _told_by_rest(bench, fit, effect, fit.values[own.start : own.stop])
     parameters = [
-        MissingParameter(fit.columns[i].name, float(fit.values[i]), float(stds[i]), fit.columns[i].unit)
-        for i, shown in zip(own, seen, strict=True)
+        MissingParameter(fit.columns[i].name, float(fit.values[i]), float(np.hypot(stds[i], more)), fit.columns[i].unit)
+        for i, more, shown in zip(own, by_rest, seen, strict=True)
         if shown
     ]
     parameters.extend(_shape_parameters(bench, fit, position, stds))
@@ -81,6 +86,15 @@ def named_effect(
         detail=effect,
         values=tuple(float(fit.values[i]) for i in own),
     )
+
+
+def _told_by_rest(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) -> FloatArray:
+    """(k,) by how much values (k,) of an effect may be off where only its rest tells it from the law of its spring."""
+    if effect.side is not Side.SPRING or not isinstance(effect, MemoryEffect):
+        return np.zeros(len(values))
+    columns = spring_columns(bench.state(fit.effects).motion, bench.robot.index(effect.required_joint), 0.0, (effect,))
+    off = told_by_rest(columns, np.concatenate([np.zeros(3), values]))
+    return np.asarray(np.linalg.norm(off[3:], axis=1), dtype=np.float64)
 
 
 def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray) -> list[MissingParameter]:

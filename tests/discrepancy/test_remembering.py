@@ -11,6 +11,7 @@ from sea_ident.discrepancy.decide import decide
 from sea_ident.discrepancy.diagnose import _tested
 from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.named import named_effects
 from sea_ident.discrepancy.remembering import CONFIRMED, remembering
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
@@ -59,6 +60,9 @@ def test_another_constant_in_another_motion_is_none(laboratory, offset, there, n
         # it never slips on the motion that was used
         travel = bench.data.motion.deflection[:, bench.robot.index(JOINT)]
         assert 2.0 * found.effects[0].slip > travel.max() - travel.min()
+        # so nothing but its rest tells it from the stiffness: how large it is is not known
+        (told,) = named_effects(bench, found, {}, held)
+        assert [p.std >= abs(p.value) for p in told.parameters if p.unit == "N m"] == [True, True]
 
 
 @pytest.mark.scenario
