@@ -35,10 +35,11 @@ def deflection_of(plant: Plant, tau_spring: FloatArray) -> FloatArray:
     torque: FloatArray = tau_spring[:, elastic]
     d: FloatArray = np.zeros_like(torque)
     # From zero, Newton on a stiffening spring may overshoot once and then falls monotonically.
-    for _ in range(60):
-        d = d - (k1 * d + k3 * d**3 - torque) / np.maximum(k1 + 3.0 * k3 * d * d, 1e-3 * k1)
-    error = np.abs(k1 * d + k3 * d**3 - torque)
-    bad = np.argwhere(error > 1e-9 * (np.abs(torque) + k1))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a softening one it may leave for good
+        for _ in range(60):
+            d = d - (k1 * d + k3 * d**3 - torque) / np.maximum(k1 + 3.0 * k3 * d * d, 1e-3 * k1)
+        error = np.abs(k1 * d + k3 * d**3 - torque)
+    bad = np.argwhere(~(error <= 1e-9 * (np.abs(torque) + k1)))
     if len(bad):
         row, column = bad[0]
         name = plant.robot.joint_names[int(elastic[column])]

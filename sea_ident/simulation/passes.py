@@ -116,8 +116,28 @@ class Passes:
         i, side = (k, "link") if k < robot.n else (int(robot.elastic_indices[k - robot.n]), "motor")
         raise SimulationError(
             f"the simulation diverged {self._at(time)}: the {side} of joint {robot.joint_names[i]!r} moves at "
-            f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s; take a shorter step than {self._clock.step:g} s, or "
-            "softer gains of the controller"
+            f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s; "
+            + (
+                self._softening(i, state)
+                or f"take a shorter step than {self._clock.step:g} s, or softer gains of the controller"
+            )
+        )
+
+    def _softening(self, i: int, state: FloatArray) -> str:
+        """Why a joint diverged where its spring softens and was bent too far; empty where it was not that."""
+        plant = self._system.plant
+        robot, stiffness, cubic = plant.robot, float(plant.stiffness[i]), float(plant.cubic_stiffness[i])
+        if not robot.joints[i].elastic or not cubic < 0.0:
+            return ""
+        motor = robot.n + robot.elastic_indices.tolist().index(i)
+        turns = float(np.sqrt(max(stiffness, 0.0) / -cubic))
+        if abs(float(state[motor] - state[i])) < turns:
+            return ""
+        joint = robot.joints[i]
+        units = f"{joint.torque_unit}/{joint.position_unit}"
+        return (
+            f"its spring (K1 {stiffness:.3g} {units}, K3 {cubic:.3g} {units}3) pushes the wrong way where it deflects "
+            f"by more than {turns:.3g} {joint.position_unit}: such a law holds no farther than it was identified"
         )
 
     def _at(self, time: float) -> str:

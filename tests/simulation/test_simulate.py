@@ -161,6 +161,23 @@ def test_motion_that_overflows_is_told_and_numpy_says_nothing(leg, friction):
         simulate(leg, modest_series(leg), periods=1, seed=0, effects=[pushed])
 
 
+def test_a_spring_that_softens_until_it_pushes_the_wrong_way_is_named_as_what_diverged():
+    """No shorter step would help: its law is that of small deflections."""
+    with pytest.raises(SimulationError, match=r"'swing'.*its spring \(K1 60 N m/rad, .* by more than 0.05 rad"):
+        simulate(softening(60.0), modest_series(softening(60.0)), periods=1)
+
+
+def test_one_that_cannot_carry_the_link_at_rest_is_refused():
+    with pytest.raises(SimulationError, match="joint 'swing': its softening spring cannot carry"):
+        simulate(softening(2.0), modest_series(softening(2.0)), periods=1)
+
+
+def softening(stiffness):
+    """A pendulum whose spring pulls less and less, and not at all at 0.05 rad."""
+    law = f'stiffness="{stiffness}" cubicStiffness="{-400.0 * stiffness}" damping="0.01"'
+    return from_parts('<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"), motor("swing", law))
+
+
 def test_missing_stiffness_is_named():
     robot = from_parts(
         '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"), motor("swing", 'damping="1"')
