@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from sea_ident.cli import output
+from sea_ident.recordings import read_recording, write_recording
 
 DATA = Path(__file__).parents[1] / ".." / "shared" / "data"
 
@@ -202,6 +203,16 @@ def test_foreign_columns_are_named_on_the_command_line(chain, tmp_path):
     assert record["rms"] == pytest.approx(said["validate"]["rms"], rel=1e-6)
 
 
+def test_a_part_of_a_recording_is_used_alone(chain, call_here, tmp_path):
+    folder, said = chain
+    write_recording(read_recording(folder / "rec.csv").crop(10.0, None), tmp_path / "part.csv")
+    own, part = (
+        json.loads(call_here("validate", "model.json", *which, "--json", cwd=folder).stdout)["rms"]
+        for which in ((tmp_path / "part.csv",), ("rec.csv", "--between", "10,"))
+    )
+    assert part == own != said["validate"]["rms"]
+
+
 def test_an_exported_robot_is_a_robot_again(chain):
     folder = chain[0]
     record = call_json("inspect", folder / "out.urdf")
@@ -260,6 +271,9 @@ def test_called_by_a_program_it_leaves_the_signals_of_that_as_they_were(call_her
         (("validate", "model.json", "rec.csv", "--column", "q_hip=q_hip,gear=2"), "gear_ratio"),
         (("validate", "model.json", "rec.csv", "--column", "q_hip=q_hip,zero=north"), "NUMBER"),
         (("validate", "model.json", "rec.csv", "--column", "q_hip=a", "--column", "q_hip=b"), "twice"),
+        (("validate", "model.json", "rec.csv", "--between", "5"), "START,STOP"),
+        (("validate", "model.json", "rec.csv", "--between", "5,then"), "START,STOP"),
+        (("identify", "exo_leg", "rec.csv", "--between", "50,60", "--out", "never.json"), "runs from 0 s to"),
     ],
 )
 def test_bad_input_names_the_culprit_and_writes_nothing(chain, call_here, arguments, expected):

@@ -1,7 +1,7 @@
 """What verbs read."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from sea_ident.discrepancy import Diagnosis
     from sea_ident.effects import Effect
     from sea_ident.estimation import Model
-    from sea_ident.recordings import ColumnSource
+    from sea_ident.recordings import ColumnSource, Recording
     from sea_ident.robot import HalfSpace, Limits, Robot
 
 
@@ -112,6 +112,24 @@ def _effects_of(robot: "Robot", text: str) -> "list[Effect]":
     return [
         make_effect(name, effect.joint, **{**effect.shape_values, **shape}) if shape else effect for effect in found
     ]
+
+
+def read_part(path: Path, columns: "Mapping[str, ColumnSource] | None", between: str | None) -> "Recording":
+    """The recording in a file, of which --between keeps a part.
+
+    Raises:
+        RecordingError: the file cannot be read, the option is not written as it should be, or nothing is left.
+    """
+    from sea_ident.recordings import read_recording
+
+    if between is None:
+        return read_recording(path, columns=columns)
+    parts = [part.strip() for part in between.split(",")]
+    try:
+        start, stop = (float(part) if part else None for part in parts)
+    except ValueError:
+        raise RecordingError(f"--between {between}: is not START,STOP in seconds, such as 5,65 or 5, or ,65") from None
+    return read_recording(path, columns=columns).crop(start, stop)
 
 
 def read_columns(texts: Sequence[str] | None) -> "dict[str, ColumnSource] | None":

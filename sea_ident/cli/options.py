@@ -70,6 +70,15 @@ ForeignColumns: TypeAlias = Annotated[
     ),
 ]
 
+Between: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--between",
+        metavar="START,STOP",
+        help="Use the recording between these times alone [s, as in the file]; either may be left out: 5, or ,65.",
+    ),
+]
+
 
 def _at_least_one_job(jobs: int) -> int:
     if jobs == -1 or jobs >= 1:

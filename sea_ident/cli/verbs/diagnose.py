@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
-from sea_ident.cli.inputs import read_columns
-from sea_ident.cli.options import AsJson, ForeignColumns, ModelFile, Period, RecordingFile, ReportFile
+from sea_ident.cli.inputs import read_columns, read_part
+from sea_ident.cli.options import AsJson, Between, ForeignColumns, ModelFile, Period, RecordingFile, ReportFile
 from sea_ident.cli.output import SHARES, by_share, check_targets, emit, note, progress
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def diagnose(
     ] = None,
     period: Period = None,
     column: ForeignColumns = None,
+    between: Between = None,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
@@ -52,7 +53,7 @@ def diagnose(
     with progress(f"reading {recording.name}", SHARES) as tell:
         found = run(
             loaded,
-            read_recording(recording, columns=columns),
+            read_part(recording, columns, between),
             holdout=None if holdout is None else read_recording(holdout, columns=columns),
             reference=earlier,
             period=period,

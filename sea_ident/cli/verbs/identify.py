@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
-from sea_ident.cli.inputs import read_columns, read_effects, read_robot, split_names
+from sea_ident.cli.inputs import read_columns, read_effects, read_part, read_robot, split_names
 from sea_ident.cli.options import (
     AddedEffects,
     AnnotationFile,
     AsJson,
+    Between,
     ForeignColumns,
     JointNames,
     Period,
@@ -30,13 +31,13 @@ def identify(
     add: AddedEffects = None,
     unknown_zero: UnknownZeros = None,
     column: ForeignColumns = None,
+    between: Between = None,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
     as_json: AsJson = False,
 ) -> None:
     """Identify the model of a robot and its springs from a recording."""
     from sea_ident.estimation import identify as run
-    from sea_ident.recordings import read_recording
 
     check_targets(out, report, inputs=(robot, annotation, recording))
     loaded = read_robot(robot, annotation, joints)
@@ -45,7 +46,7 @@ def identify(
     with progress(f"reading {recording.name}", SHARES) as tell:
         model = run(
             loaded,
-            read_recording(recording, columns=columns),
+            read_part(recording, columns, between),
             effects=effects,
             period=period,
             unknown_zero=split_names(unknown_zero),
