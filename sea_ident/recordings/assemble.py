@@ -98,7 +98,8 @@ def _expand(columns: Mapping[str, ColumnSource], table: RawTable, source: str) -
     found: dict[str, ColumnSource] = {}
     for target, how in columns.items():
         if "*" not in target:
-            if how.name not in raw:
+            every = target == how.name == TIME and table.clocks  # of the clocks of a bag, none has that name
+            if how.name not in raw and not every:
                 raise RecordingError(_absent(how.name, target, table, source))
             found[target] = how
             continue
@@ -124,13 +125,14 @@ def _streams(sources: Mapping[str, ColumnSource], table: RawTable, source: str, 
     """Columns grouped by clock, converted."""
     raw = table.columns
     time = sources.get(TIME)
-    if time is not None and table.clocks:
+    if time is not None and table.clocks and time != ColumnSource(TIME, interval=time.interval):
         raise RecordingError(
-            f"{source}: the messages of a bag have stamps of their own: leave 'time' out of columns, and choose the "
-            "clock that counts by clocks=ClockAlignment(reference=...)"
+            f"{source}: the messages of a bag have stamps of their own: of 'time' say no more than the interval that "
+            "samples were taken at, if they were stamped late, and choose the clock that counts by "
+            "clocks=ClockAlignment(reference=...)"
         )
     groups: dict[ColumnSource, dict[str, FloatArray]] = {}
-    if time is not None:
+    if time is not None and not table.clocks:
         groups[time] = {}
     for target, how in sources.items():
         if target == TIME:
@@ -138,7 +140,7 @@ def _streams(sources: Mapping[str, ColumnSource], table: RawTable, source: str, 
         if how.time is not None:
             clock = as_source(how.time)
         elif how.name in table.clocks:
-            clock = ColumnSource(table.clocks[how.name])
+            clock = ColumnSource(table.clocks[how.name], interval=None if time is None else time.interval)
         elif time is not None:
             clock = time
         else:

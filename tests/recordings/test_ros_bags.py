@@ -119,8 +119,22 @@ def test_the_clock_that_counts_can_be_chosen(tmp_path):
     assert leg.sample_rate == pytest.approx(200.0)
     assert leg.time[0] == pytest.approx(0.002)
     np.testing.assert_allclose(leg.columns["q_hip"], leg.time, atol=1e-9)
-    with pytest.raises(RecordingError, match="leave 'time' out"):
+    with pytest.raises(RecordingError, match="say no more than the interval"):
         read_recording(path, columns={"time": "/motors:time", **BOTH})
+
+
+def test_messages_that_were_stamped_late_go_back_to_an_even_grid(tmp_path):
+    """The interval is that of all clocks of the bag, as the message about uneven stamps advises."""
+    even = 0.001 * np.arange(2000)
+    late = even + np.random.default_rng(0).uniform(0.0, 3e-4, len(even))
+    swing = np.sin(3.0 * even)
+    write_recording(Recording(late, {"q_hip": swing, "theta_hip": swing + 0.01}, "late"), tmp_path / "bag")
+    assert not read_recording(tmp_path / "bag").is_uniform
+    leg = read_recording(tmp_path / "bag", columns={"time": ColumnSource("time", interval=0.001)})
+    assert leg.is_uniform
+    np.testing.assert_allclose(leg.columns["theta_hip"] - leg.columns["q_hip"], 0.01, atol=1e-9)
+    with pytest.raises(RecordingError, match="say no more than the interval"):
+        read_recording(tmp_path / "bag", columns={"time": ColumnSource("time", unit="ms", interval=1.0)})
 
 
 @pytest.mark.parametrize("write", [write_ros1, write_ros2])
