@@ -127,7 +127,7 @@ def diagnose(
     basic = completed(bench)
     if basic is not None:
         found = _compared(bench, confirm(bench, basic.selection), temperature)
-    elif data.periods < FEWEST_TO_SEARCH or wrong or _in_steps(bench):
+    elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful or _in_steps(bench):
         found = _compared(bench, confirm(bench, _unsearched(bench)), temperature)
     else:
         found = _searched(bench, temperature, tell)
