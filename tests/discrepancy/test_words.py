@@ -212,3 +212,13 @@ def test_what_changed_against_a_reference_is_told_by_what_tells_most_and_is_not_
     both = paragraph(replace(base, verdict=Verdict.NAMED, missing=(payload, *base.missing)))
     assert both.startswith("The model lacks torque_offset at hip (5 % of torque). ")
     assert both.endswith(f" Against the reference, other parameters changed too: {told}.")
+
+
+@pytest.mark.parametrize(("std", "told"), [(0.001, "x.scale 0.06 +- 0.001"), (0.0, "x.scale 0.06, held")])
+def test_a_number_without_a_unit_has_none_behind_it(std, told):
+    assert str(MissingParameter("x.scale", 0.06, std, "-")) == told
+    missing = MissingEffect(
+        "encoder_offset", "x", (MissingParameter("x.scale", 0.06, std, "-"),), 0.1, 1e-9, (),
+        detail=make_effect("encoder_offset", "x"),
+    )  # fmt: skip
+    assert missing.extent == "0.06"
