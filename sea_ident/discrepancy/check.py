@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import SIGNALS, mean_of_periods
-from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversals
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import Effect
 from sea_ident.estimation import Model
@@ -260,8 +260,9 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
 def _spiked_periods(data: PeriodData) -> set[int]:
     """Periods with a sample far from its neighbours, farther than any sample of a usual period.
 
-    Reversals are left aside: what happens there differs from pass to pass by itself. Where steps of an encoder repeat,
-    usual periods may be the same to the last step, and one that falls a sample later is no spike.
+    Reversals are left aside, those of the mean and those of every pass of the same motion: what happens there differs
+    from pass to pass by itself, and what stiction holds may be let go much later in one of them. Where steps of an
+    encoder repeat, usual periods may be the same to the last step, and one that falls a sample later is no spike.
     """
     if data.periods < 4:
         return set()
@@ -275,13 +276,18 @@ def _spiked_periods(data: PeriodData) -> set[int]:
     torque = np.diff(
         data.period_tau_motor, n=2, axis=1, prepend=data.period_tau_motor[:, -1:], append=data.period_tau_motor[:, :1]
     )
+    beside = data.left_out.copy()
+    other = _another_motion(data)
+    for p, motion in enumerate(data.period_motions):
+        if p not in other:
+            beside |= around_reversals(motion, data.equations)
     for stack, least in zip((torque, *accelerations), (none, *steps), strict=True):
         for i in range(data.robot.n):
             away = np.ones(data.samples, dtype=np.bool_)
             for e, equation in enumerate(data.equations):
                 if equation.index == i:
                     for shift in range(-SPIKE_DISTANCE, SPIKE_DISTANCE + 1):
-                        away &= ~np.roll(data.left_out[:, e], shift)
+                        away &= ~np.roll(beside[:, e], shift)
             if np.count_nonzero(away) < 16:
                 continue
             largest = np.max(np.abs(stack[:, away, i] - np.median(stack[:, away, i], axis=0)), axis=1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from sea_ident.arguments import expect
 from sea_ident.discrepancy.diagnose import diagnose
 from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import Gap, Verdict
+from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.one_thread import one_thread
@@ -73,8 +73,13 @@ class ClosedGap:
 
     @property
     def added(self) -> tuple[tuple[str, str | None], ...]:
-        """Effect and joint of everything that was added, in the order in which it was found."""
-        pairs = [(m.effect, m.joint) for d in self.rounds if d.verdict in NAMED for m in d.missing]
+        """Effect and joint of everything that was added, in the order in which it was found.
+
+        What is named and no model holds (what drifts, what differs from a reference) is not among it.
+        """
+        pairs = [
+            (m.effect, m.joint) for d in self.rounds if d.verdict in NAMED for m in d.missing if _holds(d.model, m)
+        ]
         return tuple(dict.fromkeys(pairs))
 
     @property
@@ -99,6 +104,11 @@ class ClosedGap:
             lines.append(f"     {entry.summary()}")
         lines.extend(f"  warning: {text}" for text in self.warnings)
         return "\n".join(lines)
+
+
+def _holds(model: Model | None, missing: MissingEffect) -> bool:
+    """Whether a model has what was named among its effects."""
+    return model is not None and missing.title in {e.title for e in (*model.effects, *model.spring_effects)}
 
 
 @one_thread
@@ -165,7 +175,7 @@ def close_gap(
             break
         known |= found
         model = diagnosis.model
-        if not found & {effect.title for effect in (*model.effects, *model.spring_effects)}:
+        if not any(_holds(model, m) for m in diagnosis.missing):
             notes.append(f"{names}: named, but a model of one moment has no place for what changes in the recording")
             break
     else:

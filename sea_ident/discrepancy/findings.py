@@ -105,8 +105,18 @@ class MissingParameter:
         if self.straight:
             return f"{self.name} none: the course is straight"
         value = f"{self.value:.4g}"
-        sure = f"{value} +- {self.std:.2g} {self.unit}" if self.std else f"{value} {self.unit}, held"
+        sure = f"{value} +- {self.std:.2g}{self._unit}" if self.std else f"{value}{self._unit}, held"
         return f"{self.name} {sure}"
+
+    @property
+    def amount(self) -> str:
+        """Value with its unit."""
+        return f"{self.value:.2g}{self._unit}"
+
+    @property
+    def _unit(self) -> str:
+        """Unit behind a value; a number without one has nothing behind it."""
+        return "" if self.unit in ("-", "1") else f" {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -185,7 +195,7 @@ class MissingEffect:
     def extent(self) -> str:
         """How much there is of it: its amounts where it acts on what is measured, the torque of all others."""
         if isinstance(self.detail, SignalEffect) and self.parameters:
-            return ", ".join(f"{p.value:.2g} {p.unit}" for p in self.parameters)
+            return ", ".join(p.amount for p in self.parameters)
         if self.torque_share >= TIMES:
             # a term of the law of a spring may be cancelled by others of it
             return f"{self.torque_share:.2g} times the torque"

@@ -76,9 +76,11 @@ def paragraph(facts: Facts) -> str:
         if all((m.effect, m.joint) in drifting for m in facts.added):
             parts.append("It shows in the comparison of the periods; the mean over all of them hides it.")
         else:
-            parts.append(_gap_sentence(facts.gap, facts.units, [m.joint for m in facts.missing if m.joint is not None]))
+            parts.append(_gap_sentence(facts.gap, facts.units, [m.joint for m in facts.added if m.joint is not None]))
             if facts.held is not None:
                 parts.append(_held_sentence(facts))
+        if changed := [m for m in facts.missing if m not in facts.added]:
+            parts.append(f"Against the reference, other parameters changed too: {_changed(changed)}.")
     if facts.remainder > 0.0 and facts.verdict is not Verdict.NONE:
         parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
     if facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
@@ -222,13 +224,19 @@ def _percent(share: float) -> str:
 
 def _part(facts: Facts) -> float | None:
     """Share of what the only effect could explain of other data that it does, where it holds in part there [-]."""
-    shares = [m.transfer for m in facts.missing]
+    shares = [m.transfer for m in facts.added]
     alone = shares[0] if len(shares) == 1 else None
     return alone if alone is not None and TRANSFERS < alone <= TRANSFERS_ALONE else None
 
 
+def _changed(missing: Sequence[MissingEffect]) -> str:
+    """What differs from a reference, each with the parameter that tells most."""
+    told = [(m, max(m.parameters, key=lambda p: abs(p.value) / p.std if p.std else float("inf"))) for m in missing]
+    return "; ".join(f"{m.title}, {parameter} ({m.extent})" for m, parameter in told)
+
+
 def _opening(facts: Facts) -> str:
-    names = ", ".join(f"{m.title} ({m.extent})" for m in facts.missing)
+    names = ", ".join(f"{m.title} ({m.extent})" for m in facts.added)
     match facts.verdict:
         case Verdict.NONE if facts.remainder > 0.0:
             return (
@@ -254,7 +262,7 @@ def _opening(facts: Facts) -> str:
         case Verdict.AMBIGUOUS:
             alike = "; nor ".join(
                 f"{', '.join([m.title, *(a.title for a in m.alternatives[:-1])])} from {m.alternatives[-1].title}"
-                for m in facts.missing
+                for m in facts.added
                 if m.alternatives
             )
             return f"The model lacks {names}; this motion does not tell {alike}."
@@ -272,7 +280,7 @@ def _opening(facts: Facts) -> str:
         case Verdict.ONLY_AGAINST_REFERENCE:
             if not facts.missing:
                 return "The model fits, but its parameters are not those of the reference, in a way that has no name."
-            changed = "; ".join(f"{m.title}, {m.parameters[0]} ({m.extent})" for m in facts.missing)
+            changed = _changed(facts.missing)
             return f"The model fits, but its parameters are not those of the reference. What changed: {changed}."
         case _ if not facts.sound:
             return UNSOUND

@@ -89,9 +89,9 @@ def verdict_of(
     linear, cubic, hysteresis = held_out["linear"], held_out["cubic"], held_out["hysteresis"]
     limit = stats.norm.ppf(1 - SUPPORT / 2) if not np.isfinite(freedom) else stats.t.ppf(1 - SUPPORT / 2, freedom)
     if hysteresis < 0.7 * cubic and hysteresis < 0.7 * linear and cubic > 0.01 * torque:
-        return Verdict.HYSTERETIC, f"held-out rms falls from {cubic:.3g} to {hysteresis:.3g} with a slipping element"
+        return Verdict.HYSTERETIC, f"held-out rms falls from {_apart(cubic, hysteresis, 'to')} with a slipping element"
     if abs(law[1]) > limit * std[1] and cubic < linear:
-        return Verdict.STIFFENING, f"held-out rms falls from {linear:.3g} to {cubic:.3g} with the cubic term"
+        return Verdict.STIFFENING, f"held-out rms falls from {_apart(linear, cubic, 'to')} with the cubic term"
     held = f"held-out rms {linear:.3g} without and {cubic:.3g} with the cubic term"
     if cubic < linear:
         size = abs(law[1]) / std[1] if std[1] > 0.0 else np.inf
@@ -100,3 +100,9 @@ def verdict_of(
             f"{held}, but that term is {size:.2g} standard deviations from zero, not the {limit:.2g} that it takes",
         )
     return Verdict.LINEAR, held
+
+
+def _apart(first: float, second: float, between: str) -> str:
+    """Two numbers with as many digits as it takes to tell them apart, three at least: what falls is seen to fall."""
+    texts = [(f"{first:.{digits}g}", f"{second:.{digits}g}") for digits in (3, 4, 5, 6, 7)]
+    return f" {between} ".join(next((pair for pair in texts if pair[0] != pair[1]), texts[0]))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
+from sea_ident.effects.signal import SignalEffect
 from sea_ident.estimation import Model, physical_parameters
 from sea_ident.exceptions import ExportError, OutputError, SeaIdentWarning
 from sea_ident.export.mjcf import mjcf_text
@@ -66,7 +67,9 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
     if not physical.consistent:
         (notes if physical.within_uncertainty else warnings).append(physical.verdict())
     inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
-    return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside)), notes, warnings
+    # what errs in a sensor has amounts and no columns
+    sensed = [effect.parameter_name() for effect in model.effects if isinstance(effect, SignalEffect)]
+    return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside, *sensed)), notes, warnings
 
 
 def export_urdf(model: Model, path: str | Path) -> Export:

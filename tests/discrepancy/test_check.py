@@ -140,3 +140,26 @@ def test_time_that_is_not_in_seconds_is_refused(rate):
         DiagnosisError, match=r"a.csv: no position moves faster.*--column time=time,unit=ms. If it is in"
     ):
         clock_in_seconds(Recording(1e3 * time, columns, "a.csv"))
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["let go late", "at once"])
+def test_a_joint_that_stiction_lets_go_late_in_one_pass_is_no_spike(counted, leg, held):
+    """Without the rest before it, the same acceleration is one."""
+    data = period_data(wide_processing(counted, leg, PERIOD), leg)
+    ankle, motions = leg.index("ankle"), list(data.period_motions)
+    speed = data.motion.dtheta[:, ankle]
+    begin = next(
+        k
+        for k in np.flatnonzero(np.diff(np.sign(speed)))
+        if np.all(np.sign(speed[k + 1 : k + 30]) == np.sign(speed[k + 1]))
+    )
+    late = slice(begin, begin + 20)
+    changed = {name: getattr(motions[2], name).copy() for name in ("dq", "ddq", "dtheta", "ddtheta")}
+    if held:
+        for values in changed.values():
+            values[late, ankle] = 0.0
+    for name in ("ddq", "ddtheta"):
+        changed[name][begin + 20 : begin + 24, ankle] += 30.0 * np.sign(speed[begin + 20])
+    motions[2] = replace(motions[2], **changed)
+    kept, _ = cleaned(replace(data, period_motions=tuple(motions)), counted)
+    assert kept.periods == (8 if held else 7)

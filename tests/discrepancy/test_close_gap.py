@@ -151,6 +151,7 @@ def test_what_is_named_and_cannot_be_added_is_said(models, recordings, monkeypat
     monkeypatch.setattr(close, "diagnose", lambda *_, **__: found)
     closed = sea_ident.close_gap(models[0], recordings[0])
     assert closed.model is models[0]
+    assert closed.added == ()
     assert closed.warnings == (
         "there is no repaired model: why",
         "link_friction at knee: named, but not added, for there is no repaired model",
@@ -185,3 +186,16 @@ def test_what_speaks_against_a_repaired_model_is_said_where_nothing_is_missing_t
     closed = sea_ident.close_gap(models[0], recordings[0])
     assert closed.verdict == "none"
     assert "warning: the gap of q grows" in closed.summary()
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("named", [("payload", "ankle"), ("friction_drift", "knee")], ids=lambda pair: pair[0])
+def test_what_no_model_holds_was_not_added(models, recordings, monkeypatch, named):
+    """What differs from a reference, what drifts: named beside what is added."""
+    missing = (MissingEffect(*named, (), 0.2, 1e-9, ()), MissingEffect("torque_ripple", "hip", (), 0.1, 1e-9, ()))
+    first = Diagnosis(Verdict.NAMED, "", NOTHING_LACKS, missing=missing, model=models[1])
+    rounds = iter([first, Diagnosis(Verdict.NONE, "", NOTHING_LACKS, model=models[1])])
+    monkeypatch.setattr(close, "diagnose", lambda *_, **__: next(rounds))
+    closed = sea_ident.close_gap(models[0], recordings[0])
+    assert closed.added == (("torque_ripple", "hip"),)
+    assert closed.history[0].named == (named, ("torque_ripple", "hip"))

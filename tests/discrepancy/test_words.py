@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.diagnosis import _gap
-from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, MissingParameter, Verdict, chance
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import Kind
+from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph, reservations
@@ -199,3 +200,25 @@ def test_a_suspect_says_how_far_it_holds(transfer, said):
     text = paragraph(replace(found, missing=(replace(found.missing[0], transfer=transfer),)))
     assert said in text
     assert ("as well: do not use it" in text) == (transfer > 0.5)
+
+
+def test_what_changed_against_a_reference_is_told_by_what_tells_most_and_is_not_lacking():
+    parameters = (MissingParameter("hip.payload_mx", -1e-4, 4e-4, "kg m"),
+                  MissingParameter("hip.payload_mz", -0.2, 5e-4, "kg m"))  # fmt: skip
+    payload = MissingEffect("payload", "hip", parameters, 0.31, 1e-24, ())
+    told = "payload at hip, hip.payload_mz -0.2 +- 0.0005 kg m (31 % of torque)"
+    base = replace(facts(Verdict.ONLY_AGAINST_REFERENCE), change=ParameterChange(1e-24, 0.31, (payload,)))
+    assert paragraph(replace(base, missing=(payload,))).endswith(f"What changed: {told}.")
+    both = paragraph(replace(base, verdict=Verdict.NAMED, missing=(payload, *base.missing)))
+    assert both.startswith("The model lacks torque_offset at hip (5 % of torque). ")
+    assert both.endswith(f" Against the reference, other parameters changed too: {told}.")
+
+
+@pytest.mark.parametrize(("std", "told"), [(0.001, "x.scale 0.06 +- 0.001"), (0.0, "x.scale 0.06, held")])
+def test_a_number_without_a_unit_has_none_behind_it(std, told):
+    assert str(MissingParameter("x.scale", 0.06, std, "-")) == told
+    missing = MissingEffect(
+        "encoder_offset", "x", (MissingParameter("x.scale", 0.06, std, "-"),), 0.1, 1e-9, (),
+        detail=make_effect("encoder_offset", "x"),
+    )  # fmt: skip
+    assert missing.extent == "0.06"

@@ -1,6 +1,7 @@
 """From an identified model to files: the same torque, complete files, or an error."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from given import brisk_motion, reload
 
 from sea_ident import Model, export_mjcf, export_urdf, identify, load_robot, process, read_model, simulate
-from sea_ident.effects import base_effects
+from sea_ident.effects import base_effects, make_effect
 from sea_ident.exceptions import ExportError, SeaIdentWarning
 from sea_ident.export import build_mujoco_robot, model_values
 from sea_ident.motion import FourierSeries
@@ -86,3 +87,13 @@ def test_nothing_half_written(model: Model, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match="cannot be written"):
         exported(model, tmp_path / "folder.urdf")
     assert [path.name for path in tmp_path.iterdir()] == ["folder.urdf"]
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_what_errs_in_a_sensor_is_named_as_left_out(model: Model, tmp_path: Path) -> None:
+    """It has no column, so that no parameter stands for it."""
+    late = replace(model, effects=(*model.effects, make_effect("position_delay", "knee", delay=0.002)))
+    for export, name in ((export_urdf, "leg.urdf"), (export_mjcf, "leg.xml")):
+        told = " ".join((*(written := export(late, tmp_path / name)).notes, *written.warnings))
+        assert "no place for" in told
+        assert "knee.position_delay" in told
