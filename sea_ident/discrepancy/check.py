@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.closing import SIGNALS, mean_of_periods
-from sea_ident.discrepancy.data import EquationKind, PeriodData, around_reversals
+from sea_ident.discrepancy.closing import mean_of_periods
+from sea_ident.discrepancy.data import EquationKind, PeriodData
 from sea_ident.discrepancy.findings import Gap
+from sea_ident.discrepancy.odd_periods import odd_periods
 from sea_ident.effects import Effect
 from sea_ident.estimation import Model
 from sea_ident.estimation.identify import visible_parameters
@@ -30,18 +31,6 @@ CLIPPED_SHARE = 0.05
 
 NOTHING_IN_COMMON = 0.5
 """Spread between periods, as a share of the motion, from which on they are not periods of one motion [-]."""
-
-SPIKE = 8.0
-"""How many times farther than the farthest sample of a usual period a sample must lie to count as a spike."""
-
-SPIKE_DISTANCE = 6
-"""Samples around a reversal in which no spike is looked for."""
-
-AWAY = 0.05
-"""Share of the rms of a position from which on it is away from that of the other periods [-], ..."""
-
-LASTS = 0.05
-"""... and share of a period that it is away more than usual where the motion is another: spikes are shorter [-]."""
 
 
 @dataclass(frozen=True)
@@ -223,12 +212,11 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
             "period of this motion. Give the period that was excited (period=, or --period of identify)"
         )
         fatal = True
-    odd = _spiked_periods(data)
-    if odd:
-        keep = [p for p in range(data.periods) if p not in odd]
+    odd = odd_periods(data)
+    if odd.periods:
+        keep = [p for p in range(data.periods) if p not in odd.periods]
         few = len(keep) >= max(2, data.periods // 2)
-        other = odd & _another_motion(data)
-        warnings.extend(_words_of_odd(data, odd - other, other, few))
+        warnings.extend(odd.words(data, few))
         if few:
             data = subset(data, keep)
         fatal = fatal or not few
@@ -255,86 +243,6 @@ def cleaned(data: PeriodData, recording: Recording | ProcessedRecording) -> tupl
         warnings.extend(stuck)
         fatal = fatal or bool(stuck)
     return data, Findings(tuple(warnings), fatal)
-
-
-def _spiked_periods(data: PeriodData) -> set[int]:
-    """Periods with a sample far from its neighbours, farther than any sample of a usual period.
-
-    Reversals are left aside, those of the mean and those of every pass of the same motion: what happens there differs
-    from pass to pass by itself, and what stiction holds may be let go much later in one of them. Where steps of an
-    encoder repeat, usual periods may be the same to the last step, and one that falls a sample later is no spike.
-    """
-    if data.periods < 4:
-        return set()
-    out: set[int] = set()
-    kinds = ("ddq", "ddtheta")
-    accelerations = [np.stack([getattr(m, kind) for m in data.period_motions]) for kind in kinds]
-    none = np.zeros(data.robot.n)
-    steps = [none, none]
-    if data.step_errors is not None:
-        steps = [np.sqrt(np.mean(data.step_errors[:, SIGNALS.index(kind)] ** 2, axis=(0, 1))) for kind in kinds]
-    torque = np.diff(
-        data.period_tau_motor, n=2, axis=1, prepend=data.period_tau_motor[:, -1:], append=data.period_tau_motor[:, :1]
-    )
-    beside = data.left_out.copy()
-    other = _another_motion(data)
-    for p, motion in enumerate(data.period_motions):
-        if p not in other:
-            beside |= around_reversals(motion, data.equations)
-    for stack, least in zip((torque, *accelerations), (none, *steps), strict=True):
-        for i in range(data.robot.n):
-            away = np.ones(data.samples, dtype=np.bool_)
-            for e, equation in enumerate(data.equations):
-                if equation.index == i:
-                    for shift in range(-SPIKE_DISTANCE, SPIKE_DISTANCE + 1):
-                        away &= ~np.roll(beside[:, e], shift)
-            if np.count_nonzero(away) < 16:
-                continue
-            largest = np.max(np.abs(stack[:, away, i] - np.median(stack[:, away, i], axis=0)), axis=1)
-            out |= {int(p) for p in np.flatnonzero(largest > SPIKE * max(np.median(largest), least[i]))}
-    return out
-
-
-def _another_motion(data: PeriodData) -> set[int]:
-    """Periods in which a position is away from that of the others for long, as where the motion stops."""
-    out: set[int] = set()
-    for kind in ("q", "theta"):
-        stack = np.stack([getattr(m, kind) for m in data.period_motions])
-        usual = np.median(stack, axis=0)
-        share = np.mean(np.abs(stack - usual) > AWAY * usual.std(axis=0), axis=1)
-        out |= {int(p) for p in np.flatnonzero(np.any(share > LASTS + np.median(share, axis=0), axis=1))}
-    return out
-
-
-def _words_of_odd(data: PeriodData, spiked: set[int], other: set[int], few: bool) -> list[str]:
-    """What is said of periods with spikes and of those with another motion, few enough to be left out or not."""
-    found = []
-    for periods, what, why, remedies in (
-        (
-            spiked,
-            "spikes",
-            "far outside what the other periods show",
-            ("Check the wiring of the sensor", "Repair the sensor and record again"),
-        ),
-        (
-            other,
-            "the motion stops or differs",
-            "where its position is away from that of the other periods for long",
-            ("Cut the recording to where the motion repeats itself",) * 2,
-        ),
-    ):
-        where = ", ".join(str(p + 1) for p in sorted(periods)[:8])
-        if periods and few:
-            found.append(
-                f"{data.source}: {what} in period(s) {where} of {data.periods}, {why}; these periods were left out. "
-                f"{remedies[0]}"
-            )
-        elif periods:
-            found.append(
-                f"{data.source}: {what} in {len(periods)} of {data.periods} periods ({where}): too many to leave out. "
-                f"{remedies[1]}"
-            )
-    return found
 
 
 def subset(data: PeriodData, keep: list[int]) -> PeriodData:
