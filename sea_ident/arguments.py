@@ -1,6 +1,6 @@
 """The border of the functions for users: an argument of another kind is named with what gives the right one."""
 
-from numbers import Real
+from numbers import Integral, Real
 
 from sea_ident.exceptions import SeaIdentError
 
@@ -11,6 +11,14 @@ _GIVEN_BY = {
     "Diagnosis": "diagnose(...) or read_diagnosis(...)",
     "Effect": "make_effect(name, joint)",
     "Excitation": "design_excitation(...) or read_excitation(...)",
+    "Limits": "robot.limits, or robot.limits.replace(...),",
+    "Ramp": "Ramp(seconds)",
+    "LinksInside": "LinksInside(reserve)",
+    "LinksAsPlanned": "LinksAsPlanned()",
+    "Criterion": "DOptimality() or another of sea_ident.excitation",
+    "Estimator": "InstrumentalVariables() or another of sea_ident.estimation",
+    "Controller": "VelocityController() or another of sea_ident.simulation",
+    "FrictionLaw": "SmoothCoulomb() or another of sea_ident.simulation",
 }
 
 
@@ -33,6 +41,34 @@ def expect(value: object, where: str, *kinds: type) -> None:
     raise SeaIdentError(f"{where} must be a {' or a '.join(names)}, not a {type(value).__name__}{hint}")
 
 
+def expect_optional(value: object, where: str, *kinds: type) -> None:
+    """Refuse an argument that is neither None nor of one of these kinds, as `expect`."""
+    if value is not None:
+        expect(value, where, *kinds)
+
+
+def expect_whole(value: object, where: str, least: int | None = None) -> None:
+    """Refuse an argument that is no whole number, or one that is too small.
+
+    Args:
+        value: the argument.
+        where: function and name of the argument, for the message.
+        least: the smallest that is allowed; any where None.
+
+    Raises:
+        SeaIdentError: it is something else, or smaller.
+    """
+    if not isinstance(value, Integral) or isinstance(value, bool) or (least is not None and value < least):
+        bound = "" if least is None else f" of at least {least}"
+        raise SeaIdentError(f"{where} must be a whole number{bound}, not {value!r}")
+
+
+def expect_real(value: object, where: str) -> None:
+    """Refuse an argument that is not a number."""
+    if not _is_number(value):
+        raise SeaIdentError(f"{where} must be a number, not a {type(value).__name__}, {value!r}")
+
+
 def expect_number(value: object, where: str, unit: str) -> None:
     """Refuse an argument that is neither a number nor None.
 
@@ -44,5 +80,9 @@ def expect_number(value: object, where: str, unit: str) -> None:
     Raises:
         SeaIdentError: it is something else.
     """
-    if value is not None and (not isinstance(value, Real) or isinstance(value, bool)):
+    if value is not None and not _is_number(value):
         raise SeaIdentError(f"{where} must be a number [{unit}] or None, not a {type(value).__name__}, {value!r}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

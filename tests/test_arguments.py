@@ -16,9 +16,12 @@ from sea_ident import (
     write_recording,
     write_report,
 )
+from sea_ident.excitation import Ramp
+from sea_ident.motion import FourierSeries
 from sea_ident.recordings import Recording
 
 LEG = load_robot("exo_leg")
+SERIES = FourierSeries(0.1, np.zeros(3), np.zeros((3, 1)), np.zeros((3, 1)))
 RECORDING = Recording(np.arange(9.0), {"q_hip": np.arange(9.0)}, "test")
 
 
@@ -39,8 +42,38 @@ RECORDING = Recording(np.arange(9.0), {"q_hip": np.arange(9.0)}, "test")
         (lambda: export_urdf("out.urdf", LEG), r"must be a Model, not a str"),
         (lambda: write_report("out.html", LEG), r"must be a Model or a Diagnosis, not a str"),
         (lambda: write_recording("out.csv", RECORDING), r"must be a Recording, not a str"),
+        (lambda: design_excitation(LEG, ramp=2.0), r"ramp must be a Ramp, not a float; Ramp\(seconds\) gives one"),
+        (lambda: design_excitation(LEG, links=0.1), r"links must be a LinksInside or a LinksAsPlanned, not a float"),
+        (lambda: design_excitation(LEG, criterion="D"), r"criterion must be a Criterion, not a str; DOptimality"),
+        (lambda: design_excitation(LEG, limits=3), r"limits must be a Limits, not a int; robot.limits"),
+        (lambda: design_excitation(LEG, effects=["payload"]), r"each of effects must be a Effect"),
+        (lambda: design_excitation(LEG, base_frequency="0.1"), r"base_frequency must be a number, not a str"),
+        (lambda: design_excitation(LEG, rate=None), r"rate must be a number, not a NoneType"),
+        (lambda: Ramp("2"), r"Ramp: duration must be a number"),
+        (lambda: Ramp(-1.0), r"duration of the ramp is -1.0 s"),
+        (lambda: simulate(LEG, SERIES, periods=1.5), r"periods must be a whole number, not 1.5"),
+        (lambda: simulate(LEG, SERIES, seed=-1), r"seed must be a whole number of at least 0, not -1"),
+        (lambda: simulate(LEG, SERIES, rate=np.inf), r"rate inf Hz must all be positive and finite"),
+        (lambda: simulate(LEG, SERIES, rate=1e9), r"are 1e\+10 steps, more than"),
+        (lambda: simulate(LEG, SERIES, step=np.inf), r"step inf s must all be positive and finite"),
+        (lambda: simulate(LEG, SERIES, rate="200"), r"rate must be a number"),
+        (lambda: simulate(LEG, SERIES, controller="x"), r"controller must be a Controller, .* VelocityController"),
+        (lambda: simulate(LEG, SERIES, sensors=0.1), r"sensors must be a SensorNoise, not a float"),
+        (lambda: simulate(LEG, SERIES, friction=0.1), r"friction must be a FrictionLaw, not a float"),
+        (lambda: simulate(LEG, SERIES, friction=[0.1] * 3), r"friction must be a FrictionLaw, not a float"),
+        (lambda: identify(LEG, RECORDING, estimator="wls"), r"estimator must be a Estimator, not a str"),
+        (lambda: identify(LEG, RECORDING, prior="model.json"), r"prior must be a Model, not a str; .*read_model"),
+        (lambda: identify(LEG, RECORDING, effects=[]), r"effects is empty"),
+        (lambda: process(RECORDING, LEG, link_harmonics=1.5), r"link_harmonics must be a whole number of at least 1"),
     ],
 )
 def test_a_wrong_kind_of_argument_is_a_message(call, expected):
     with pytest.raises(SeaIdentError, match=expected):
         call()
+
+
+def test_whole_numbers_of_few_bits_do_not_overflow():
+    """A count from an array of small integers is the number that it looks like."""
+    wanted = {"starts": 1, "seed": 1, "jobs": 1}
+    few, plain = (design_excitation(LEG, harmonics=kind(3), **wanted) for kind in (np.int8, int))
+    assert few.log_det == plain.log_det

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect, expect_number
+from sea_ident.arguments import expect, expect_number, expect_optional
 from sea_ident.base_parameters import BaseParameters, find_base_parameters, group_columns
 from sea_ident.effects import Effect, JointEffect, base_effects
 from sea_ident.effects.coulomb_friction import CoulombFriction
@@ -99,6 +99,10 @@ def identify(
     expect_number(period, "identify: period", "s")
     for each in effects or ():
         expect(each, "identify: each of effects", Effect)
+    if effects is not None and not effects:
+        raise IdentificationError("effects is empty; name those of the model, or leave it out")
+    expect_optional(estimator, "identify: estimator", Estimator)
+    expect_optional(prior, "identify: prior", Model)
     tell = progress or (lambda what, share: None)
     if isinstance(recording, ProcessedRecording):
         processed = recording

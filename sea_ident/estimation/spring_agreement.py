@@ -20,6 +20,9 @@ WRONG = 0.1
 BEYOND_NOISE = 3.0
 """... where that is so many times its noise."""
 
+ALREADY = 0.5
+"""Part of what a law leaves that it left where it was found, from which on another recording is not to blame [-]."""
+
 
 @dataclass(frozen=True)
 class SpringAgreement:
@@ -110,7 +113,8 @@ def spring_agreement(
             float(np.sqrt(np.mean(torque[used, k] ** 2))),
             robot.joints[joint].torque_unit,
         )
-        found.append(plain if doubted else _with_warning(plain, spring.verdict))
+        before = spring.rms_residual / spring.rms_torque if spring.rms_torque > 0.0 else 0.0
+        found.append(plain if doubted else _with_warning(plain, spring.verdict, before))
     return tuple(found)
 
 
@@ -122,12 +126,19 @@ def _by_law(spring: SpringResult, motion: Motion, joint: int) -> FloatArray:
     return torque
 
 
-def _with_warning(found: SpringAgreement, verdict: Verdict) -> SpringAgreement:
+def _with_warning(found: SpringAgreement, verdict: Verdict, before: float = 0.0) -> SpringAgreement:
+    """With what is to be said of it; `before` is the share that the law left where it was found [-]."""
     beyond = found.noise_std is None or found.rms > BEYOND_NOISE * found.noise_std
     if not (found.nrms > WRONG and beyond):
         return found
     why = "this motion may load it more than the one it was found on; record more of both"
-    if verdict is not Verdict.NOT_EXCITED:
+    if before > max(WRONG, ALREADY * found.nrms):
+        # on the same motion it would be so again: neither an encoder nor this motion has to differ
+        why = (
+            f"on the recording that it was found on it left {100 * before:.3g} %: it lacks something, or the dynamic "
+            "model that gives this torque does, or does not tell it; see the warnings of the model"
+        )
+    elif verdict is not Verdict.NOT_EXCITED:
         why = (
             "has an encoder another zero than before, or the spring a part that the first motion did not show? "
             "`diagnose` looks for it"

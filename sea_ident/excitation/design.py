@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect
+from sea_ident.arguments import expect, expect_optional, expect_real
 from sea_ident.effects import Effect
 from sea_ident.exceptions import ExcitationError, SeaIdentWarning
 from sea_ident.excitation.board import Progress
@@ -96,10 +96,15 @@ def design_excitation(
     """
     expect(robot, "design_excitation: robot", Robot)
     begin = time.perf_counter()
+    _check_kinds(criterion, effects, limits, motors, links, ramp)
+    for name, number in (("base_frequency", base_frequency), ("rate", rate), ("tolerance_factor", tolerance_factor)):
+        expect_real(number, f"design_excitation: {name}")
     for name, number in (("harmonics", harmonics), ("starts", starts), ("seed", seed), ("jobs", jobs)):
         _check_whole(name, number, least=-np.inf if name == "jobs" else 0)
     if starts == 0 and start is None:
         raise ExcitationError("starts is 0; give at least 1, or a start")
+    # numbers of NumPy may be of few bits, and overflow in what is computed with them
+    harmonics, starts, seed, jobs = int(harmonics), int(starts), int(seed), int(jobs)
     samples = _check_sampling(base_frequency, harmonics, rate)
     if effects is not None and not effects:
         raise ExcitationError("effects is empty; name those whose parameters are to be told, or leave it out")
@@ -148,6 +153,18 @@ def design_excitation(
     seconds = time.perf_counter() - begin
     result = problem.result(there.coefficients, ramps, starts, found.values, seed, seconds, tuple(notes))
     return replace(result, margins={**result.margins, **there.kept}, link_margins=there.margins)
+
+
+def _check_kinds(
+    criterion: object, effects: Sequence[Effect] | None, limits: object, motors: object, links: object, ramp: object
+) -> None:
+    for each in effects or ():
+        expect(each, "design_excitation: each of effects", Effect)
+    expect_optional(criterion, "design_excitation: criterion", Criterion)
+    expect_optional(limits, "design_excitation: limits", Limits)
+    expect_optional(motors, "design_excitation: motors", PredictedMotors)
+    expect_optional(links, "design_excitation: links", LinksInside, LinksAsPlanned)
+    expect_optional(ramp, "design_excitation: ramp", Ramp)
 
 
 def _check_start(start: FloatArray, problem: Problem, notes: list[str]) -> FloatArray:

@@ -200,13 +200,20 @@ def known_friction(robot: Robot) -> tuple[KnownFriction, ...]:
 def _note_unknown(robot: Robot, rows: list[int], notes: list[str]) -> None:
     """Say which friction the predicted torque leaves out."""
     missing = [
-        robot.joints[i].name
+        robot.joints[i]
         for i in rows
         if np.isnan(ViscousFriction(joint=robot.joints[i].name).prior(robot)[0])
         and np.isnan(CoulombFriction(joint=robot.joints[i].name).prior(robot)[0])
     ]
-    if missing:
-        notes.append(
-            f"torques are predicted without friction at {', '.join(missing)}: the description gives none; lower the "
-            f"torque limits by what friction may take"
-        )
+    # friction of an elastic joint's link is in the prediction, and says nothing of its motor's
+    links = [joint.name for joint in missing if joint.elastic and (joint.damping or joint.friction)]
+    neither = [joint.name for joint in missing if joint.name not in links]
+    for names, without, given in (
+        (neither, "friction", "none"),
+        (links, "friction of the motors", "that of the links alone"),
+    ):
+        if names:
+            notes.append(
+                f"torques are predicted without {without} at {', '.join(names)}: the description gives {given}; lower "
+                f"the torque limits by what friction may take"
+            )

@@ -209,8 +209,6 @@ class Problem:
         """
         series, rest = self.series(coefficients), self.centre[:, -1]
         duration = 0.5 * series.period if ramp.duration is None else ramp.duration
-        if not (np.isfinite(duration) and duration > 0.0):
-            raise ExcitationError(f"the duration of the ramp is {duration} s; it must be positive")
         return (
             design_ramp(series, self.limits, duration, rest, self._allows),
             design_ramp_out(series, self.limits, duration, rest, self._allows),

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from sea_ident._typing import FloatArray
-from sea_ident.exceptions import InfeasibleError
+from sea_ident.arguments import expect_number
+from sea_ident.exceptions import ExcitationError, InfeasibleError
 from sea_ident.excitation.linear_limits import LinearLimits
 from sea_ident.excitation.quadratic import solve_quadratic
 from sea_ident.motion import FourierSeries, Motion
@@ -29,6 +30,11 @@ class Ramp:
     """
 
     duration: float | None = None
+
+    def __post_init__(self) -> None:
+        expect_number(self.duration, "Ramp: duration", "s")
+        if self.duration is not None and not (np.isfinite(self.duration) and self.duration > 0.0):
+            raise ExcitationError(f"the duration of the ramp is {self.duration} s; it must be positive")
 
 
 @dataclass(frozen=True, eq=False)

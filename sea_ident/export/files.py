@@ -56,14 +56,22 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
     physical = physical_parameters(model)
     values = collect_values(model.robot, physical.columns, physical.values)
     laws = {spring.joint: spring.law for spring in model.springs}
+    warnings: list[str] = []
     joints = []
     for joint in values.joints:
         if joint.joint in laws:
             stiffness, cubic, damping = laws[joint.joint]
+            if stiffness <= 0.0:
+                # neither load_robot nor a simulator takes such a spring
+                warnings.append(
+                    f"the stiffness of the spring of {joint.joint!r} came out as {stiffness:.4g}, which no spring has: "
+                    "it is left out, and what the description says of this spring stays; see the warnings of the model"
+                )
+                joints.append(joint)
+                continue
             joint = replace(joint, stiffness=stiffness, cubic_stiffness=cubic, damping=damping)
         joints.append(joint)
     notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
-    warnings: list[str] = []
     if not physical.consistent:
         (notes if physical.within_uncertainty else warnings).append(physical.verdict())
     inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
@@ -92,6 +100,11 @@ def export_urdf(model: Model, path: str | Path) -> Export:
     expect(model, "export_urdf: model", Model)
     values, notes, warnings = model_values(model)
     text, remarks = urdf_text(values)
+    if model.robot.locked:
+        notes.append(
+            f"joints that the model holds are in the URDF as they were ({', '.join(model.robot.locked)}): load it with "
+            f"joints, on the command line --joints {','.join(model.robot.joint_names)}, to have the robot of the model"
+        )
     return _write(path, "urdf", text, notes, [*warnings, *remarks])
 
 
@@ -122,5 +135,5 @@ def _write(path: str | Path, kind: str, text: str, notes: list[str], warnings: l
     except OutputError as error:
         raise ExportError(str(error)) from None
     for warning in warnings:
-        python_warnings.warn(warning, SeaIdentWarning, stacklevel=3)
+        python_warnings.warn(f"{path}: {warning}", SeaIdentWarning, stacklevel=3)
     return Export(Path(path), kind, tuple(notes), tuple(warnings))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect, expect_number
+from sea_ident.arguments import expect, expect_number, expect_whole
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.one_thread import one_thread
@@ -62,6 +62,9 @@ def process(
     expect(recording, "process: recording", Recording)
     expect(robot, "process: robot", Robot)
     expect_number(period, "process: period", "s")
+    for name, number in (("link_harmonics", link_harmonics), ("motor_harmonics", motor_harmonics)):
+        if number is not None:
+            expect_whole(number, f"process: {name}", least=1)
     moving, signals, period = _in_motion(recording, robot, period)
     uniform = moving.is_uniform
     if period is None:

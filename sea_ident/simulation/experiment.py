@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.arguments import expect
+from sea_ident.arguments import expect, expect_optional, expect_real, expect_whole
 from sea_ident.effects import measured_signals
 from sea_ident.exceptions import SimulationError
 from sea_ident.motion import FourierSeries, Motion
@@ -39,6 +39,10 @@ class Settling:
 
     tolerance: float = 1e-8
     longest: int = 10
+
+
+MOST_STEPS = 20_000_000
+"""Of the integrator in one pass of the reference, or samples; a pass is held in memory."""
 
 
 @one_thread
@@ -101,9 +105,17 @@ def simulate(
     expect(robot, "simulate: robot", Robot)
     for each in effects:
         expect(each, "simulate: each of effects", PlantedEffect)
-    if periods < 1 or not rate > 0.0 or not (step is None or step > 0.0):
-        given = "" if step is None else f" and step {step} s"
-        raise SimulationError(f"periods {periods}, rate {rate} Hz{given} must all be positive")
+    for argument, given, wanted in (
+        ("sensors", sensors, SensorNoise),
+        ("jitter", jitter, FrictionJitter),
+        ("controller", controller, Controller),
+        ("plant", plant, Plant),
+        ("warm_up", warm_up, WarmUp),
+        ("settling", settling, Settling),
+        ("start", start, Motion),
+    ):
+        expect_optional(given, f"simulate: {argument}", wanted)
+    _check_numbers(periods, seed, rate, step, lead)
     check_planted(robot, effects)
     plant = plant_from_robot(robot) if plant is None else plant
     if plant.robot.joint_names != robot.joint_names or plant.robot.elastic != robot.elastic:
@@ -112,6 +124,7 @@ def simulate(
     follow = as_reference(robot, reference)
     laws = _per_joint(robot, friction or SmoothCoulomb.usual(robot))
     step = usual_step(plant, laws, follow) if step is None else step
+    _check_size(follow, rate, step)
     clock, method = Clock.build(follow, rate, step), ros34pw2()
     drive = (controller or VelocityController()).drive(robot, follow, clock.stage_times(method.nodes))
     state = _initial_state(plant, drive, start)
@@ -197,10 +210,32 @@ def simulate(
     )
 
 
+def _check_numbers(periods: int, seed: object, rate: float, step: float | None, lead: float) -> None:
+    expect_whole(periods, "simulate: periods")
+    expect_whole(seed, "simulate: seed", least=0)
+    for name, number in (("rate", rate), ("step", rate if step is None else step), ("lead", lead)):
+        expect_real(number, f"simulate: {name}")
+    if periods < 1 or not 0.0 < rate < np.inf or not (step is None or 0.0 < step < np.inf):
+        given = "" if step is None else f" and step {step} s"
+        raise SimulationError(f"periods {periods}, rate {rate} Hz{given} must all be positive and finite")
+
+
+def _check_size(follow: Reference, rate: float, step: float) -> None:
+    """Refuse what no memory holds, before it is asked for."""
+    steps = follow.duration * max(rate, 1.0 / step)
+    if steps > MOST_STEPS:
+        raise SimulationError(
+            f"{follow.duration:g} s at a rate of {rate:g} Hz and steps of {step:g} s are {steps:.3g} steps, more than "
+            f"{MOST_STEPS}; take a lower rate or a longer step"
+        )
+
+
 def _per_joint(robot: Robot, friction: FrictionLaw | Sequence[FrictionLaw]) -> list[FrictionLaw]:
     """(n,) friction laws."""
     if isinstance(friction, FrictionLaw):
         return [friction] * robot.n
+    for each in [friction] if not isinstance(friction, Sequence) else friction:
+        expect(each, "simulate: each of friction", FrictionLaw)
     if len(friction) != robot.n:
         raise SimulationError(f"{len(friction)} friction laws for {robot.n} joints; give one, or one per joint")
     return list(friction)

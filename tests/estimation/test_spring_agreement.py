@@ -135,5 +135,30 @@ def test_what_noise_explains_is_no_warning(noise, warned):
     assert bool(found.warning) == warned
 
 
+@pytest.mark.parametrize(
+    ("before", "verdict", "expected"),
+    [
+        (0.25, Verdict.LINEAR, "on the recording that it was found on it left 25 %"),
+        (0.25, Verdict.NOT_EXCITED, "on the recording that it was found on it left 25 %"),
+        (0.12, Verdict.LINEAR, "another zero than before"),
+        (0.05, Verdict.LINEAR, "another zero than before"),
+        (0.0, Verdict.NOT_EXCITED, "load it more"),
+    ],
+)
+def test_a_law_that_never_held_is_not_blamed_on_the_new_recording(before, verdict, expected):
+    found = _with_warning(SpringAgreement("hip", 0.27, 1e-3, 1.0, "N m"), verdict, before)
+    assert expected in found.warning
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_no_encoder_is_suspected_of_another_zero_on_the_recording_that_the_law_is_from(leg):
+    own = record(leg, truth_of(leg, leg_series()), 8, **NOISE)
+    moved = own.replace_columns({"theta_knee": own.columns["theta_knee"] + 0.2})
+    model = identify(leg, moved, period=10.0)
+    knee = springs(model, moved, period=10.0)["knee"]
+    assert "on the recording that it was found on it left" in knee.warning
+    assert "another zero" not in knee.warning
+
+
 def test_without_laws_there_is_nothing_to_compare(model, other):
     assert springs(replace(model, springs=()), other, period=10.0) == {}

@@ -53,6 +53,24 @@ def test_urdf_predicts_what_the_model_predicts(model: Model, tmp_path: Path) -> 
         assert (actuator.stiffness, actuator.cubic_stiffness, actuator.damping) == spring.law
 
 
+def test_a_spring_with_negative_stiffness_is_left_out(model: Model, tmp_path: Path) -> None:
+    """The file can be read again, and says of this spring what the description says."""
+    hip, *rest = model.springs
+    wrong = replace(model, springs=(replace(hip, stiffness=-9.0, linear_stiffness=-9.0), *rest))
+    result = exported(wrong, tmp_path / "leg.urdf")
+    assert any("spring of 'hip' came out as -9, which no spring has" in text for text in result.warnings)
+    again, given = (robot.spring("hip") for robot in (load_robot(tmp_path / "leg.urdf"), model.robot))
+    assert (again.stiffness, again.cubic_stiffness) == (given.stiffness, given.cubic_stiffness)
+    with pytest.raises(ExportError, match="'hip' has no stiffness; identify the springs first"):
+        export_mjcf(wrong, tmp_path / "leg.xml")
+
+
+def test_joints_that_the_model_holds_are_told(model: Model, tmp_path: Path) -> None:
+    held = replace(model, robot=replace(model.robot, locked={"toe": 0.0}))
+    (note,) = [text for text in exported(held, tmp_path / "leg.urdf").notes if "(toe)" in text]
+    assert "--joints hip,knee,ankle" in note
+
+
 def test_mjcf_predicts_what_the_model_predicts(model: Model, tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MJCF is judged by MuJoCo: pip install 'sea-ident[mujoco]'")
     result = exported(model, tmp_path / "leg.xml")
