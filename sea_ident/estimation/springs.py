@@ -15,7 +15,7 @@ from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.solve import solve_across
 from sea_ident.estimation.spring_misfit import spring_misfit
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
-from sea_ident.estimation.spring_untold import told_by_rest, untold
+from sea_ident.estimation.spring_untold import ROUNDING, told_by_rest, untold
 from sea_ident.estimation.spring_verdict import held_out_rms, verdict_of
 from sea_ident.estimation.uncertainty import FEW_PERIODS, CovarianceKind, Uncertainty
 from sea_ident.exceptions import IdentificationError
@@ -319,8 +319,12 @@ def _solve(data: _SpringData, zero: float, extra: FloatArray) -> tuple[FloatArra
     if data.per_period is None:
         unit = design / norms
         nothing = untold(data.name, unit.T @ unit, data.owners)
-        instruments = data.answered(unit) if data.harmonics else unit
-        inverse = solve_across(instruments.T @ unit, instruments.T, nothing)
+        if data.harmonics:
+            instruments = data.answered(unit)
+            inverse = solve_across(instruments.T @ unit, instruments.T, nothing)
+        else:
+            # products would square how far the columns are from being the same
+            inverse = np.linalg.pinv(unit - unit @ nothing @ nothing.T, rcond=ROUNDING**0.5)
         values = inverse @ data.tau
     else:
         periods = len(data.per_period)

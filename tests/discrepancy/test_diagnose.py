@@ -173,7 +173,7 @@ def test_nothing_is_looked_for_where_a_torque_has_the_wrong_sign(intact, intact_
 
 @pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
-def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_model):
+def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_model, monkeypatch):
     """Neither of a recording, nor of one pass of it, nor on one held out; where nothing disagrees, that holds."""
     training, holdout = intact
 
@@ -185,8 +185,14 @@ def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_m
     spoiled = in_degrees(training)
     model = sea_ident.identify(leg, spoiled, period=5.0)
     one_pass = Recording(spoiled.time[:1500], {name: v[:1500] for name, v in spoiled.columns.items()}, "one pass")
+
+    def searched(*_):
+        raise AssertionError("what is searched for would be dropped")
+
     for recording in (spoiled, one_pass):
-        found = sea_ident.diagnose(model, recording)
+        with monkeypatch.context() as patched:
+            patched.setattr(sys.modules["sea_ident.discrepancy.diagnose"], "_searched", searched)
+            found = sea_ident.diagnose(model, recording)
         assert (found.verdict, found.missing, found.model) == ("cannot_tell", (), None)
         assert "the warnings say what" in found.text
         # what follows from them is not told as well
