@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sea_ident.estimation.solve import solve_across
 from sea_ident.estimation.spring_untold import told_by_rest, untold
 from sea_ident.exceptions import IdentificationError
 
@@ -38,3 +39,13 @@ def test_what_is_the_law_but_for_a_constant_may_be_all_of_it():
 
 def test_a_law_alone_has_nothing_to_rest():
     assert told_by_rest(LAW, np.ones(3)).shape == (3, 0)
+
+
+def test_what_is_not_told_takes_no_part_in_a_solution():
+    """Not even where rounding, or noise on the right, points that way."""
+    basis = np.linalg.qr(np.random.default_rng(0).normal(size=(4, 4)))[0]
+    nothing = basis[:, :1]
+    gram = basis[:, 1:] @ np.diag([1.0, 2.0, 3.0]) @ basis[:, 1:].T + 1e-15 * nothing @ nothing.T
+    exact = basis[:, 1:] @ np.array([1.0, -2.0, 0.5])
+    found = solve_across(gram, gram @ exact + 0.1 * nothing[:, 0], nothing)
+    np.testing.assert_allclose(found, exact, atol=1e-12)
