@@ -215,8 +215,8 @@ class Recording:
         own = {kind for kind, other in filter(None, map(split_name, self.columns)) if other == joint}
         if not own:
             return (
-                f" If {joint!r} was held still and not recorded, leave it out of the joints that move (joints, on the "
-                "command line --joints)."
+                f" If {joint!r} was held still and not recorded, leave it out of the joints that move (joints of "
+                "load_robot, on the command line identify --joints)."
             )
         if name.startswith("theta_") and "q" in own:
             return (

@@ -19,6 +19,7 @@ from sea_ident.excitation import Excitation
 from sea_ident.report.content import Content
 from sea_ident.report.section import DiagnosisSection, ModelSection
 from sea_ident.report.sections import SECTIONS
+from sea_ident.robot.describe import counted
 from sea_ident.validation import Validation
 
 
@@ -128,8 +129,8 @@ def _headings(content: Content) -> tuple[str, str]:
     about = ""
     if model is not None:
         about = (
-            f"{model.robot.n} joints, {len(model.springs)} springs; from {Path(model.recording).name} by "
-            f"{model.estimator.replace('_', ' ')}"
+            f"{counted(model.robot.n, 'joint')}, {counted(len(model.springs), 'spring')}; from "
+            f"{Path(model.recording).name} by {model.estimator.replace('_', ' ')}"
         )
     if diagnosis is None:
         return (f"{model.robot.name}: identified model" if model is not None else "Report"), about

@@ -11,9 +11,15 @@ if TYPE_CHECKING:
     from sea_ident.robot.model import Joint, Robot
 
 
+def counted(count: int, thing: str) -> str:
+    """A number of things in words: 1 joint, 2 joints."""
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
 def robot_summary(robot: "Robot") -> str:
     """A table of joints, with limits, motors and springs as far as the description states them."""
-    lines = [f"{robot.name}: {robot.n} joints, {len(robot.rotors)} motors, {sum(robot.elastic)} springs"]
+    counts = ((robot.n, "joint"), (len(robot.rotors), "motor"), (sum(robot.elastic), "spring"))
+    lines = [f"{robot.name}: {', '.join(counted(*each) for each in counts)}"]
     width = max((_cells(joint.name) for joint in robot.joints), default=5)
     for i, joint in enumerate(robot.joints):
         lower, upper = robot.limits.lower[i], robot.limits.upper[i]

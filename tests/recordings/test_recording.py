@@ -47,7 +47,7 @@ def test_absent_channel_names_joint_column_file_and_what_exists():
 
 def test_an_absent_channel_says_what_to_do_without_it():
     leg = recording(q_hip=TIME, current_hip=TIME)
-    with pytest.raises(RecordingError, match=r"'knee' was held still .* --joints"):
+    with pytest.raises(RecordingError, match=r"'knee' was held still .* identify --joints"):
         leg.channel("q", ["knee"])
     with pytest.raises(RecordingError, match="describe its transmission as transmission_interface/SimpleTransmission"):
         leg.channel("theta", ["hip"])

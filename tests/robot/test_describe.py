@@ -15,6 +15,13 @@ def test_summary_tells_every_number_that_was_read() -> None:
     assert f"{robot.limits.velocity[0]:g} rad/s" in text
 
 
+def test_one_is_no_plural() -> None:
+    one = build(link("base") + link("a") + joint("one", "base", "a") + sea("one"))
+    two = build(link("base") + link("a") + link("b") + joint("one", "base", "a") + joint("two", "a", "b"))
+    assert ": 1 joint, 1 motor, 1 spring\n" in one.summary()
+    assert ": 2 joints, 0 motors, 0 springs\n" in two.summary()
+
+
 def test_what_is_not_stated_is_not_invented() -> None:
     bare = build(link("base") + link("a") + joint("one", "base", "a") + sea("one"))
     text = bare.summary()
