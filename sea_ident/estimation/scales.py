@@ -23,11 +23,13 @@ def doubts_of_springs(robot: Robot, springs: Sequence[SpringResult]) -> list[str
         What may be wrong with the columns or the units of a recording, or with the model.
     """
     found = [
-        f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g}, "
-        f"deflection {s.largest_deflection:.3g} at most): have the encoders of link and motor different zeros "
-        "(unknown_zero, on the command line --unknown-zero), has one of them the wrong sign, or does the model lack "
-        "friction of the link (effect link_friction)?"
+        f"spring of {s.joint}: its stiffness comes out negative ({s.stiffness:.4g} +- {s.stiffness_std:.2g} "
+        f"{j.torque_unit}/{j.position_unit}, deflection {s.largest_deflection:.3g} {j.position_unit} at most): have "
+        "the encoders of link and motor different zeros (identify with unknown_zero, on the command line "
+        "--unknown-zero), has one of them the wrong sign, or does the model lack friction of the link (effect "
+        "link_friction)?"
         for s in springs
+        for j in (robot.joints[robot.index(s.joint)],)
         if s.stiffness < -5.0 * s.stiffness_noise_std
     ]
     return [*found, *other_scale(robot, springs)]

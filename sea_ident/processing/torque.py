@@ -146,7 +146,8 @@ def _spikes(recording: Recording, values: FloatArray, column: str) -> list[str]:
     return [
         f"{recording.source}: column {column} has {spikes.size} spikes, the first at sample {k} (time "
         f"{recording.time[k]:g} s), {beside[k] / usual:.3g} times as far from its neighbours as 99 % of the samples: "
-        "a few such samples outweigh the others. Look at the sensor and its wiring, or use the robust estimator"
+        "a few such samples outweigh the others. Look at the sensor and its wiring, or identify with the robust "
+        "estimator"
     ]
 
 

@@ -68,7 +68,8 @@ class Plant:
         for i, joint in enumerate(self.robot.joints):
             if joint.elastic and not self.stiffness[i] > 0.0:
                 raise SimulationError(
-                    f"joint {joint.name!r}: the stiffness of its spring is {self.stiffness[i]:g} N m/rad; "
+                    f"joint {joint.name!r}: the stiffness of its spring is {self.stiffness[i]:g} "
+                    f"{joint.torque_unit}/{joint.position_unit}; "
                     "it must be positive"
                 )
             if not 0.0 < self.efficiency[i] <= 1.0:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 import sea_ident
-from sea_ident.estimation.scales import other_scale
+from sea_ident.estimation.scales import doubts_of_springs, other_scale
 from sea_ident.simulation import simulate
 
 
@@ -20,6 +20,16 @@ def springs(leg, factors):
         SimpleNamespace(joint=name, linear_stiffness=leg.spring(name).stiffness * factor)
         for name, factor in zip(leg.joint_names, factors, strict=True)
     ]
+
+
+def test_a_negative_stiffness_is_told_with_units_and_where_an_unknown_zero_is_given(leg):
+    spring = SimpleNamespace(
+        joint="knee", stiffness=-40.0, stiffness_std=1.0, stiffness_noise_std=1.0, largest_deflection=0.02,
+        linear_stiffness=-40.0,
+    )  # fmt: skip
+    (text,) = doubts_of_springs(leg, [spring])
+    assert "(-40 +- 1 N m/rad, deflection 0.02 rad at most)" in text
+    assert "identify with unknown_zero" in text  # a diagnosis relays it, and has no such argument
 
 
 @pytest.mark.parametrize(

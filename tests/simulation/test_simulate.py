@@ -240,6 +240,22 @@ def test_friction_does_not_hold_a_small_slide_back():
     assert np.sqrt(np.mean(error**2)) < 0.25 * run.reference.theta.std()
 
 
+def test_stiffness_of_a_slide_has_its_unit():
+    plant = plant_from_robot(slide())
+    with pytest.raises(SimulationError, match="'grip': the stiffness of its spring is -5 N/m; it must be positive"):
+        plant.replace(stiffness=np.array([-5.0]))
+
+
+def slide():
+    """One elastic slide."""
+    return from_parts(
+        '<link name="base"/>', link("finger", mass=0.2),
+        '<joint name="grip" type="prismatic"><parent link="base"/><child link="finger"/><axis xyz="1 0 0"/>'
+        '<limit lower="0" upper="0.04" velocity="0.2" effort="50"/></joint>',
+        motor("grip", 'stiffness="100" damping="0.1"'),
+    )  # fmt: skip
+
+
 def test_friction_of_a_slide_turns_over_at_slide_speeds():
     """By default the model of a slide smooths at 1 mm/s; a simulation that smoothed as at a hinge would differ."""
     robot = quietly(load_robot, "emps")
