@@ -171,6 +171,16 @@ def test_the_page_calls_nothing_complete_beside_a_lack_of_fit(p_value, complete,
     assert ("othing is named" in page) is not complete
 
 
+def test_one_stretch_is_said_to_give_hints_and_no_test(tmp_path):
+    untested = LackOfFit(0.0, 0, 1.0, 1.0, {"hip": {}})
+    bare = Diagnosis(Verdict.NAMED_WITH_REMAINDER, "A sentence.", untested)
+    page = page_of(bare, tmp_path)
+    assert "ere are hints at what is missing" in page
+    assert "something small is left" not in page
+    assert "Not tested" in page
+    assert "by noise alone" not in page
+
+
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_every_verdict_has_a_page_even_with_nothing_else(verdict, tmp_path):
     bare = Diagnosis(verdict, "A sentence.", LackOfFit(0.0, 1, 1.0, 1.0, {}))

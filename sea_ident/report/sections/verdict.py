@@ -33,6 +33,9 @@ class VerdictSection(DiagnosisSection):
         level, meaning = MEANING[diagnosis.verdict]
         if diagnosis.verdict is Verdict.NONE and lack.p_value < LACK_LEVEL:
             level, meaning = "warn", "nothing is named, though model and data disagree beyond the noise"
+        tested = lack.dof > 0  # one stretch has no periods to tell noise from what is missing
+        if diagnosis.verdict is Verdict.NAMED_WITH_REMAINDER and not tested:
+            meaning = "there are hints at what is missing, and no periods to test them by"
         one, several = ("effect missing", "effects missing")
         if diagnosis.verdict is Verdict.ONLY_AGAINST_REFERENCE:
             one, several = ("change against the reference", "changes against the reference")
@@ -51,6 +54,7 @@ class VerdictSection(DiagnosisSection):
             "text": diagnosis.text,
             "tiles": tiles,
             "lack": lack,
+            "tested": tested,
             "equations": equations,
             "fit_level": _level(lack.p_value),
             "fit_chance": chance(lack.p_value).removeprefix("= "),
