@@ -28,8 +28,7 @@ def doubts_of_springs(robot: Robot, springs: Sequence[SpringResult]) -> list[str
         "the encoders of link and motor different zeros (identify with unknown_zero, on the command line "
         "--unknown-zero), has one of them the wrong sign, or does the model lack friction of the link (effect "
         "link_friction)?"
-        for s in springs
-        for j in (robot.joints[robot.index(s.joint)],)
+        for s, j in ((s, robot.joints[robot.index(s.joint)]) for s in springs)
         if s.stiffness < -5.0 * s.stiffness_noise_std
     ]
     return [*found, *other_scale(robot, springs)]

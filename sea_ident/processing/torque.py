@@ -9,6 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
 from sea_ident.recordings import Recording
 from sea_ident.robot import Joint, Robot
+from sea_ident.robot.describe import counted
 
 SATURATED_SHARE = 0.005
 """Share of the samples at the very extreme of a current from which on it is called saturated."""
@@ -144,7 +145,7 @@ def _spikes(recording: Recording, values: FloatArray, column: str) -> list[str]:
         return []
     k = int(spikes[0])
     return [
-        f"{recording.source}: column {column} has {spikes.size} spikes, the first at sample {k} (time "
+        f"{recording.source}: column {column} has {counted(spikes.size, 'spike')}, the first at sample {k} (time "
         f"{recording.time[k]:g} s), {beside[k] / usual:.3g} times as far from its neighbours as 99 % of the samples: "
         "a few such samples outweigh the others. Look at the sensor and its wiring, or identify with the robust "
         "estimator"
