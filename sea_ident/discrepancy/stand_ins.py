@@ -6,6 +6,8 @@ parameters that its own cause could not have:
 - A ripple of which the motion sees but a part ends as a wave much longer than a turn of the joint, though nothing in a
   joint turns so slowly. Where a motion does not show the length of a wave such a length says nothing, and the wave
   fits; where something is left beside it, the length is what came nearest to something else.
+- The longest wave, with its zero where the encoder has its own, is a straight line: what grows evenly along the path,
+  or is measured with another scale.
 - Friction of a link that is viscous alone, without any dry friction of the bearings and seals that it is in, is what an
   encoder does that is late. A damper fits; where something is left, it is none.
 - A parallel spring without stiffness is a constant torque.
@@ -26,6 +28,7 @@ from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.parallel_spring import ParallelSpring
+from sea_ident.effects.torque_ripple import TorqueRipple
 
 NO_DRY_FRICTION = 0.01
 """Share of the power of a friction up to which it has no dry part [-]: a tenth of its torque."""
@@ -68,6 +71,11 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
             words = "without any stiffness"
         elif slowest(effect) and not fits:
             words = "as less than a wave in a turn of the joint, and nothing in it turns so slowly"
+        elif isinstance(effect, TorqueRipple) and _is_line(bench, fit, position, effect):
+            words = (
+                "as a straight line through the zero of the joint, as a wrong gear ratio, an encoder of another scale "
+                "or a spring beside the motor makes it"
+            )
         elif isinstance(effect, LinkFriction) and not fits and _is_viscous(bench, fit, position):
             words = "as viscous alone, as if its encoder were late, and leaves more than noise"
         elif isinstance(effect, Backlash) and not never_closed(bench, fit.effects, position):
@@ -75,6 +83,14 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
         if words:
             found.append(StandIn(effect.name, effect.joint, words, 1.0, fit.solution))
     return tuple(found)
+
+
+def _is_line(bench: Bench, fit: Fit, position: int, ripple: TorqueRipple) -> bool:
+    """Whether less than a wave in a turn has a sine alone: one of any cause is zero elsewhere than its encoder is."""
+    if ripple.order >= 2.0 * ripple.least:  # the least that counts is half a wave in a turn
+        return False
+    index = sum(bench.counts(fit.effects)[:position]) + 1
+    return bool(abs(fit.values[index]) < NOTHING * fit.std(index))
 
 
 def _is_nothing(bench: Bench, fit: Fit, position: int) -> bool:

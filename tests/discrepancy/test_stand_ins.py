@@ -59,6 +59,15 @@ def test_a_wave_of_which_the_motion_shows_but_a_part_keeps_its_name(nothing_miss
     assert stand_ins(bench, selection) == ()
 
 
+def test_a_straight_line_through_the_zero_of_an_encoder_is_no_ripple(nothing_missing):
+    """A wrong gear ratio makes one, and nothing is left beside it."""
+    theta = nothing_missing[0].data.motion.theta[:, KNEE]
+    bench, selection = ripple_found(nothing_missing[0], 2.0 * np.sin(0.5 * theta), 0.5)
+    assert selection.effects[0].order < 1.0
+    (wave,) = stand_ins(bench, selection)
+    assert "a wrong gear ratio" in wave.sentence
+
+
 def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_missing, angle):
     away, reach = angle
     bench, selection = ripple_found(nothing_missing[0], np.sin(12.0 * away) + (away / reach) ** 2, 12.0)
