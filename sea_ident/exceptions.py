@@ -28,6 +28,24 @@ class SimulationError(SeaIdentError):
     """A simulation cannot be run, or diverged."""
 
 
+class DivergenceError(SimulationError):
+    """A simulation diverged, which another step or another controller may mend.
+
+    Args:
+        what: what diverged, where and when.
+        remedy: what to do where it was called; who calls it for another purpose tells another one.
+    """
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(f"{what}; {remedy}")
+        self.what = what
+        self._parts = (what, remedy)
+
+    def __reduce__(self) -> tuple[type["DivergenceError"], tuple[str, str]]:
+        # By default only the message would travel between processes, which is not what the constructor takes.
+        return DivergenceError, self._parts
+
+
 class IdentificationError(SeaIdentError):
     """Parameters cannot be estimated from this data."""
 

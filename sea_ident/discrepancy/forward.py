@@ -25,6 +25,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy import words
 from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import corrected_motion
@@ -225,7 +226,7 @@ def simulation_gap(
         try:
             runs = [next(simulations) for _ in parts]
         except SeaIdentError as error:
-            notes.append(f"no forward simulation of the model {label} the repair: {error}")
+            notes.append(words.not_simulated(label, error))
             return SimulationGap({}, tuple(notes))
         deviations.append([deviations_of(run, part, len(parts) > 1) for run, part in zip(runs, parts, strict=True)])
     names = before.robot.joint_names

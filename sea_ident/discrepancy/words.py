@@ -14,6 +14,7 @@ from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.exceptions import DivergenceError, SeaIdentError
 
 FEW_PERIODS = 10
 
@@ -108,6 +109,20 @@ def slow_samples(data: PeriodData) -> str:
         f"{equation.joint}): there friction follows from a velocity that is hardly more than its noise, and what is "
         "named does not explain them. Let the joints pass zero velocity faster"
     )
+
+
+def not_simulated(label: str, error: SeaIdentError) -> str:
+    """Why the model before or after the repair has no forward simulation, and what to do.
+
+    `simulate` advises on its own arguments, of which a diagnosis has but the controller.
+    """
+    why = str(error)
+    if isinstance(error, DivergenceError):
+        why = (
+            f"{error.what}; in Python, give `diagnose` the controller of the robot, or one with softer gains "
+            "(controller=). What was found does not rest on this simulation"
+        )
+    return f"no forward simulation of the model {label} the repair: {why}"
 
 
 def told_by_the_other_motion(joint: str) -> str:

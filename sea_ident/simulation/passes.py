@@ -6,7 +6,7 @@ from math import ceil
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.exceptions import SimulationError
+from sea_ident.exceptions import DivergenceError, SimulationError
 from sea_ident.motion import Motion
 from sea_ident.simulation.controller import Drive
 from sea_ident.simulation.dynamics import ClosedLoop
@@ -114,13 +114,15 @@ class Passes:
         speeds = np.where(np.isfinite(state[size:]), np.abs(state[size:]), np.inf)
         k = int(np.argmax(speeds))
         i, side = (k, "link") if k < robot.n else (int(robot.elastic_indices[k - robot.n]), "motor")
-        raise SimulationError(
+        what = (
             f"the simulation diverged {self._at(time)}: the {side} of joint {robot.joint_names[i]!r} moves at "
-            f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s; "
-            + (
-                self._softening(i, state)
-                or f"take a shorter step than {self._clock.step:g} s, or softer gains of the controller"
-            )
+            f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s"
+        )
+        softening = self._softening(i, state)
+        if softening:
+            raise SimulationError(f"{what}; {softening}")
+        raise DivergenceError(
+            what, f"take a shorter step than {self._clock.step:g} s, or softer gains of the controller"
         )
 
     def _softening(self, i: int, state: FloatArray) -> str:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy import close
+from sea_ident.discrepancy import close, forward
 from sea_ident.discrepancy.data import wide_processing
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, Verdict
 from sea_ident.discrepancy.forward import command_of, simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, read_model
-from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.exceptions import DivergenceError, SeaIdentWarning
 from sea_ident.simulation import PlantedEffect, VelocityController
 
 PERIOD = 5.0
@@ -121,6 +121,21 @@ def test_a_model_that_cannot_be_simulated_gives_no_gap_but_the_reason(leg, model
     found = simulation_gap(broken, models[1], recordings[1], wide_processing(recordings[1], leg, PERIOD))
     assert found.gaps == {}
     assert "no forward simulation of the model before the repair" in found.notes[-1]
+
+
+@pytest.mark.scenario
+def test_where_a_simulation_diverges_the_advice_is_one_that_a_diagnosis_can_follow(
+    leg, models, recordings, monkeypatch
+):
+    """It has no argument for the step."""
+
+    def diverging(*_):
+        raise DivergenceError("the simulation diverged at 0.1 s", "take a shorter step than 0.001 s")
+
+    monkeypatch.setattr(forward, "simulated", diverging)
+    found = simulation_gap(*models, recordings[1], wide_processing(recordings[1], leg, PERIOD))
+    assert "before the repair: the simulation diverged at 0.1 s; in Python, give `diagnose`" in found.notes[-1]
+    assert "step" not in found.notes[-1]
 
 
 @pytest.mark.scenario
