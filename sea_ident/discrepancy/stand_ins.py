@@ -25,10 +25,12 @@ from sea_ident.discrepancy.judge import never_closed, slowest
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.effects import Effect
 from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.parallel_spring import ParallelSpring
 from sea_ident.effects.torque_ripple import TorqueRipple
+from sea_ident.robot import Robot
 
 NO_DRY_FRICTION = 0.01
 """Share of the power of a friction up to which it has no dry part [-]: a tenth of its torque."""
@@ -70,7 +72,7 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
         if isinstance(effect, ParallelSpring) and _is_nothing(bench, fit, position):
             words = "without any stiffness"
         elif slowest(effect) and not fits:
-            words = "as less than a wave in a turn of the joint, and nothing in it turns so slowly"
+            words = too_slow(bench.robot, effect)
         elif isinstance(effect, TorqueRipple) and _is_line(bench, fit, position, effect):
             words = (
                 "as a straight line through the zero of the joint, as a wrong gear ratio, an encoder of another scale "
@@ -83,6 +85,13 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
         if words:
             found.append(StandIn(effect.name, effect.joint, words, 1.0, fit.solution))
     return tuple(found)
+
+
+def too_slow(robot: Robot, effect: Effect) -> str:
+    """How the longest wave that there is came out, in words; a slide has no turns."""
+    if effect.joint is not None and robot.joints[robot.index(effect.joint)].prismatic:
+        return "as hardly more than a straight line over the way of the joint"
+    return "as less than a wave in a turn of the joint, and nothing in it turns so slowly"
 
 
 def _is_line(bench: Bench, fit: Fit, position: int, ripple: TorqueRipple) -> bool:

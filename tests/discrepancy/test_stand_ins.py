@@ -3,17 +3,20 @@
 Torque is added to that of a leg that has nothing but what the model has, on its motion as it was measured.
 """
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sea_ident import load_robot
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.judge import slowest
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.discrepancy.stand_ins import stand_ins
+from sea_ident.discrepancy.stand_ins import stand_ins, too_slow
 from sea_ident.effects import Effect, make_effect
+from sea_ident.exceptions import SeaIdentWarning
 
 KNEE = 1
 
@@ -66,6 +69,17 @@ def test_a_straight_line_through_the_zero_of_an_encoder_is_no_ripple(nothing_mis
     assert selection.effects[0].order < 1.0
     (wave,) = stand_ins(bench, selection)
     assert "a wrong gear ratio" in wave.sentence
+
+
+def test_a_slow_wave_of_a_slide_is_told_without_turns():
+    said = too_slow(quietly(load_robot, "emps"), make_effect("torque_ripple", "slider"))
+    assert said == "as hardly more than a straight line over the way of the joint"
+
+
+def quietly(function, *args):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        return function(*args)
 
 
 def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_missing, angle):
