@@ -229,6 +229,12 @@ class Gap:
         return 1.0 - after / before if before > 0.0 else 0.0
 
     @property
+    def opens(self) -> bool:
+        """Whether there was no gap in any joint, and there is one now: no share says how much it grew."""
+        there = any(after > self.noise[joint] for joint, after in self.after.items())
+        return there and not any(value > 0.0 for value in self.before.values())
+
+    @property
     def largest(self) -> str:
         """The joint where the gap was largest, beside its noise where units differ."""
         return self.largest_of(list(self.before))

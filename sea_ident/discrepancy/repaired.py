@@ -127,8 +127,9 @@ def _worse_than_before(diagnosis: Diagnosis) -> tuple[str, ...]:
             for joint, before in gap.before.items()
             if gap.after[joint] > np.hypot(before, gap.noise[joint])
         )
-        if parts and gap.shrink < 0.0:
-            found.append(f"of {kind} by {-100.0 * gap.shrink:.0f} % ({parts})")
+        if parts and (gap.opens or gap.shrink < 0.0):
+            growth = "from nothing" if gap.opens else f"by {-100.0 * gap.shrink:.0f} %"
+            found.append(f"of {kind} {growth} ({parts})")
     if not found:
         return ()
     return (

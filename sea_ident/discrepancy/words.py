@@ -175,7 +175,8 @@ def _held_sentence(facts: Facts) -> str:
     where = f"On {facts.kind}"
     weaker = "" if facts.kind is Kind.OTHER_MOTION else " (the same motion again, which is a weaker test)"
     if not any(value > 0.0 for value in held.before.values()):
-        return f"{where}{weaker} the model was within the noise before already."
+        left = ", and is no longer" if held.opens else ""
+        return f"{where}{weaker} the model was within the noise before already{left}."
     if held.shrink < 0.0:
         return f"{where}{weaker} the gap grows by {-100 * held.shrink:.0f} %."
     return f"{where}{weaker} the gap shrinks by {100 * held.shrink:.0f} %."

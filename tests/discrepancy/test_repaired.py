@@ -12,6 +12,7 @@ from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Verdict
 from sea_ident.discrepancy.repaired import Repaired, repair, with_repaired
 from sea_ident.estimation.agreement import Agreement
+from sea_ident.report.sections import gap as gap_section
 
 JOINTS = ("hip", "knee", "ankle")
 NOISE = dict.fromkeys(JOINTS, 0.1)
@@ -78,3 +79,13 @@ def test_a_gap_that_grows_in_forward_simulation_is_said_with_its_numbers(leg):
     shrinks = replace(rad, before=rad.after, after=rad.before)
     in_noise = replace(rad, noise=dict.fromkeys(JOINTS, 0.01))
     assert judged(leg, [0.1, 0.1, 0.1], {"q": shrinks, "theta": in_noise}) == []
+
+
+def test_a_gap_that_opens_in_forward_simulation_is_said_too(leg):
+    """No share of nothing says how much it grew."""
+    noise = dict.fromkeys(JOINTS, 1e-5)
+    rad = Gap(sizes(0.0, 0.0, 0.0), sizes(0.0, 5e-5, 0.0), noise, dict.fromkeys(JOINTS, "N m"))
+    (text,) = judged(leg, [0.1, 0.1, 0.1], {"q": rad})
+    assert "grows with the repair: of q from nothing (knee 0 -> 5e-05 rad)" in text
+    assert judged(leg, [0.1, 0.1, 0.1], {"q": replace(rad, after=sizes(0.0, 5e-6, 0.0))}) == []
+    assert gap_section._closed(rad, True) == "The model was within the noise before already, and is no longer."

@@ -48,7 +48,7 @@ class GapSection(DiagnosisSection):
 def _closed(gap: Gap, added: bool) -> str:
     """How much of a gap is closed, in words."""
     if not any(value > 0.0 for value in gap.before.values()):
-        return "The model was within the noise before already."
+        return f"The model was within the noise before already{', and is no longer' if gap.opens else ''}."
     if not added:
         return "No effect is named that the model lacks, so nothing was added."
     if gap.shrink < 0.0:
