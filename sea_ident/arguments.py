@@ -1,6 +1,9 @@
 """The border of the functions for users: an argument of another kind is named with what gives the right one."""
 
+import os
+from collections.abc import Collection
 from numbers import Integral, Real
+from pathlib import Path
 
 from sea_ident.exceptions import SeaIdentError
 
@@ -38,13 +41,49 @@ def expect(value: object, where: str, *kinds: type) -> None:
     names = [kind.__name__ for kind in kinds]
     sources = [_GIVEN_BY[name] for name in names if name in _GIVEN_BY]
     hint = f"; {' or '.join(sources)} gives one" if sources else ""
-    raise SeaIdentError(f"{where} must be a {' or a '.join(names)}, not a {type(value).__name__}{hint}")
+    raise SeaIdentError(f"{where} must be {' or '.join(map(_with_article, names))}, not {_kind(value)}{hint}")
 
 
 def expect_optional(value: object, where: str, *kinds: type) -> None:
     """Refuse an argument that is neither None nor of one of these kinds, as `expect`."""
     if value is not None:
         expect(value, where, *kinds)
+
+
+def as_path(value: object, where: str) -> Path:
+    """The path that an argument is.
+
+    Args:
+        value: the argument.
+        where: function and name of the argument, for the message.
+
+    Returns:
+        The path; whether anything is there is for the caller to see.
+
+    Raises:
+        SeaIdentError: it is neither a text nor a path.
+    """
+    # Bytes are no path here: they would have to be decoded by a guess.
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
+        raise SeaIdentError(f"{where} must be a path, as text or pathlib.Path, not {_kind(value)}, {value!r}")
+    return Path(value)
+
+
+def expect_names(value: object, where: str) -> None:
+    """Refuse an argument that is no list of texts.
+
+    Args:
+        value: the argument.
+        where: function and name of the argument, for the message.
+
+    Raises:
+        SeaIdentError: it is one text, no list, or a list of something else.
+    """
+    if isinstance(value, str) or not isinstance(value, Collection):
+        raise SeaIdentError(f"{where} must be a list of names, not {value!r}")
+    for name in value:
+        if not isinstance(name, str):
+            raise SeaIdentError(f"{where} must be a list of names; {name!r} in it is {_kind(name)}")
 
 
 def expect_whole(value: object, where: str, least: int | None = None) -> None:
@@ -66,7 +105,7 @@ def expect_whole(value: object, where: str, least: int | None = None) -> None:
 def expect_real(value: object, where: str) -> None:
     """Refuse an argument that is not a number."""
     if not _is_number(value):
-        raise SeaIdentError(f"{where} must be a number, not a {type(value).__name__}, {value!r}")
+        raise SeaIdentError(f"{where} must be a number, not {_kind(value)}, {value!r}")
 
 
 def expect_number(value: object, where: str, unit: str) -> None:
@@ -81,7 +120,16 @@ def expect_number(value: object, where: str, unit: str) -> None:
         SeaIdentError: it is something else.
     """
     if value is not None and not _is_number(value):
-        raise SeaIdentError(f"{where} must be a number [{unit}] or None, not a {type(value).__name__}, {value!r}")
+        raise SeaIdentError(f"{where} must be a number [{unit}] or None, not {_kind(value)}, {value!r}")
+
+
+def _kind(value: object) -> str:
+    """What it is, in words."""
+    return "None" if value is None else _with_article(type(value).__name__)
+
+
+def _with_article(name: str) -> str:
+    return f"{'an' if name[0] in 'aeiouAEIOU' else 'a'} {name}"
 
 
 def _is_number(value: object) -> bool:

@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from sea_ident.arguments import as_path
 from sea_ident.exceptions import OutputError
 
 LONGEST = 100
@@ -33,7 +34,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     Raises:
         OutputError: the folder does not exist or cannot be written to, or the disk is full.
     """
-    target = Path(path)
+    target = as_path(path, "the file to write")
     temporary = _sibling(target)
     try:
         yield temporary

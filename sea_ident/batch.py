@@ -17,6 +17,7 @@ from joblib import Parallel, delayed
 from joblib.externals.loky.process_executor import BrokenProcessPool
 
 import sea_ident
+from sea_ident.arguments import as_path, expect, expect_whole
 from sea_ident.atomic import atomic_file
 from sea_ident.estimation import identify
 from sea_ident.exceptions import RecordingError, SeaIdentError, SeaIdentWarning
@@ -174,10 +175,13 @@ def identify_batch(
         RecordingError: there is no such folder, or no recording in it.
         SeaIdentError: `jobs` is 0.
     """
+    expect(robot, "identify_batch: robot", Robot)
+    expect_whole(jobs, "identify_batch: jobs")
     if jobs == 0:
         raise SeaIdentError("jobs is 0; give at least 1, or -1 for one per core")
-    target = Path(folder) / "identified" if out is None else Path(out)
-    paths, others = _recordings(Path(folder), target / TABLE)
+    folder = as_path(folder, "identify_batch: folder")
+    target = folder / "identified" if out is None else as_path(out, "identify_batch: out")
+    paths, others = _recordings(folder, target / TABLE)
     try:
         for name in (MODELS, ROWS):
             (target / name).mkdir(parents=True, exist_ok=True)

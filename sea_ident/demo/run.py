@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from sea_ident.arguments import as_path
 from sea_ident.atomic import atomic_file
 from sea_ident.demo import pictures
 from sea_ident.demo.gait import gait
@@ -155,7 +156,7 @@ def run_demo(
 
 
 def _folder(out: str | Path) -> Path:
-    folder = Path(out)
+    folder = as_path(out, "run_demo: out")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

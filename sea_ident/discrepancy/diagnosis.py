@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sea_ident.arguments import as_path
 from sea_ident.discrepancy.findings import (
     Alternative,
     Detectability,
@@ -155,7 +156,7 @@ class Diagnosis:
         Raises:
             ModelFileError: if it cannot be written.
         """
-        target = Path(path)
+        target = as_path(path, "save: path")
         partial = target.with_name(target.name + ".part")
         try:
             partial.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
@@ -188,7 +189,7 @@ def read_diagnosis(path: str | Path) -> Diagnosis:
         ModelFileError: if it cannot be read or is no diagnosis.
     """
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        record = json.loads(as_path(path, "read_diagnosis: path").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise ModelFileError(f"{path}: the diagnosis cannot be read: {error}") from error
     try:

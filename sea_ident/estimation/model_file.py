@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import as_path
 from sea_ident.atomic import atomic_file
 from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Side, effect_from_dict
@@ -136,7 +137,7 @@ def read_model(path: str | Path) -> Model:
     Raises:
         ModelFileError: it is missing, damaged, or no model of a version known here; says what and where.
     """
-    path = Path(path)
+    path = as_path(path, "read_model: path")
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise ModelFileError(f"{path}: {path.stat().st_size} bytes is too large for a model")

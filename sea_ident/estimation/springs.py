@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import expect, expect_names
 from sea_ident.effects import JointEffect, corrected_motion
 from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
@@ -47,6 +48,10 @@ def identify_springs(
         IdentificationError: the spring torque cannot be computed.
         RobotError: `unknown_zero` names a joint that is no elastic joint.
     """
+    from sea_ident.estimation.model import Model  # which imports this module
+
+    expect(model, "identify_springs: model", Model)
+    expect(processed, "identify_springs: processed", ProcessedRecording)
     observations = Observations(model.robot, model.effects, model.base, processed)
     inside = tuple(effect for effect in model.spring_effects if isinstance(effect, JointEffect))
     return springs_from(observations, model.values, model.uncertainty, unknown_zero, inside)
@@ -70,6 +75,7 @@ def springs_from(
     """
     robot, processed = observations.robot, observations.processed
     elastic = robot.elastic_indices
+    expect_names(unknown_zero, "unknown_zero")
     for name in unknown_zero:
         robot.spring(name)
     for effect in effects:

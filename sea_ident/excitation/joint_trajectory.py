@@ -7,6 +7,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from sea_ident.arguments import as_path
 from sea_ident.atomic import atomic_directory, atomic_file, scratch_folder
 from sea_ident.exceptions import ExcitationError, MissingExtraError, OutputError
 from sea_ident.excitation.result import Excitation
@@ -86,7 +87,7 @@ def write_trajectory_bag(
         ExcitationError: as `sample_trajectory`, or it cannot be written.
         MissingExtraError: rosbags is not installed.
     """
-    path, store = Path(path), bag_types()
+    path, store = as_path(path, "the bag to write"), bag_types()
     motion = sample_trajectory(excitation, rate, periods)
     message = _message(store, excitation.joint_names, motion)
     single: dict[str, Storage] = {".mcap": "mcap", ".db3": "sqlite3"}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import as_path
 from sea_ident.atomic import atomic_file
 from sea_ident.exceptions import ExcitationError, OutputError
 from sea_ident.excitation.ramp import RampMotion
@@ -182,7 +183,7 @@ def read_excitation(path: str | Path) -> Excitation:
         ExcitationError: not such a file, or one that is incomplete or damaged.
     """
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        record = json.loads(as_path(path, "read_excitation: path").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise ExcitationError(f"{path}: cannot be read as an excitation: {error}") from None
     if not isinstance(record, Mapping) or record.get("format") != FORMAT:

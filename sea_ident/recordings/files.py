@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sea_ident.arguments import expect
+from sea_ident.arguments import as_path, expect, expect_optional, expect_whole
 from sea_ident.atomic import atomic_directory, atomic_file
 from sea_ident.exceptions import RecordingError, SeaIdentWarning
 from sea_ident.recordings.alignment import ClockAlignment
@@ -84,8 +84,10 @@ def read_recording(
         RecordingError: the file cannot be read, or its contents are no recording; says where and what to do.
         MissingExtraError: the format needs a package that is not installed.
     """
-    path = Path(path)
-    sources = None if columns is None else {target: as_source(value) for target, value in columns.items()}
+    path = as_path(path, "read_recording: path")
+    expect_optional(clocks, "read_recording: clocks", ClockAlignment)
+    expect_whole(memory_limit, "read_recording: memory_limit", least=1)
+    sources = None if columns is None else _sources(columns)
     names = None if sources is None else _names(sources)
     with errors_of_libraries(path) as found:
         table = _format(path).read(path, names, memory_limit)
@@ -113,7 +115,7 @@ def write_recording(recording: Recording, path: str | Path) -> None:
         MissingExtraError: the format needs a package that is not installed.
     """
     expect(recording, "write_recording: recording", Recording)
-    path = Path(path)
+    path = as_path(path, "write_recording: path")
     check_suffix(path)
     suffix = path.suffix.lower()
     if suffix == "":
@@ -149,6 +151,15 @@ def check_suffix(path: Path) -> None:
 def _load(name: str) -> Any:
     module, function = name.split(":")
     return getattr(import_module(f"sea_ident.recordings.{module}"), function)
+
+
+def _sources(columns: Mapping[str, str | ColumnSource]) -> dict[str, ColumnSource]:
+    """The translation, checked: it comes from a user."""
+    expect(columns, "read_recording: columns", Mapping)
+    for target, source in columns.items():
+        expect(target, "read_recording: each key of columns", str)
+        expect(source, f"read_recording: columns[{target!r}]", str, ColumnSource)
+    return {target: as_source(source) for target, source in columns.items()}
 
 
 def _names(sources: Mapping[str, ColumnSource]) -> set[str]:

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sea_ident.exceptions import RobotError
+from sea_ident.arguments import expect_names
+from sea_ident.exceptions import RobotError, SeaIdentError
 from sea_ident.robot.urdf import MOVING_TYPES, REFUSED_TYPES, UrdfTree
 
 
@@ -55,9 +56,13 @@ def moving_joints(tree: UrdfTree, chosen: Sequence[str] | None) -> set[str]:
     """
     independent = [j.name for j in tree.joints.values() if j.type in MOVING_TYPES and j.mimic is None]
     can_move = f"joints that can move: {', '.join(independent) or 'none'}"
-    if isinstance(chosen, str):
-        raise RobotError(f"{tree.file}: joints is the text {chosen!r}; give a list of names; {can_move}")
-    if chosen is None:
+    if chosen is not None:
+        try:
+            expect_names(chosen, "joints")
+        except SeaIdentError as error:
+            raise RobotError(f"{tree.file}: {error}; {can_move}") from None
+        chosen = list(chosen)
+    else:
         for joint in tree.joints.values():
             if joint.type in REFUSED_TYPES:
                 raise RobotError(

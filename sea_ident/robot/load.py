@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
+from sea_ident.arguments import as_path
 from sea_ident.exceptions import RobotError, SeaIdentWarning
 from sea_ident.robot.annotation import Annotation, parse_annotation
 from sea_ident.robot.assemble import add_rotors, link_model, lock_joints
@@ -40,6 +41,9 @@ def load_robot(
     Raises:
         RobotError: a file that cannot be read or used; the message says what to change.
     """
+    as_path(source, "load_robot: source")
+    if annotation is not None:
+        as_path(annotation, "load_robot: annotation")
     text = read_text(find_urdf(source))
     fragment = None if annotation is None else read_text(find_urdf(annotation))
     return robot_from_text(text, str(source), fragment, joints, annotation_name=str(annotation or ""))

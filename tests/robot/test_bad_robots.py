@@ -189,7 +189,7 @@ def test_fragment_that_is_none(annotation: str, message: str) -> None:
         (("mount",), "joint 'mount' is fixed; it cannot be chosen to move"),
         (("finger",), "joint 'finger' mimics 'elbow'; choose that one"),
         ((), "no joint was chosen to move"),
-        ("elbow", "joints is the text 'elbow'; give a list of names"),
+        ("elbow", "joints must be a list of names, not 'elbow'"),
     ],
 )
 def test_joints_that_cannot_be_chosen(joints: tuple[str, ...], message: str) -> None:
