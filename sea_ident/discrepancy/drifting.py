@@ -2,7 +2,8 @@
 
 A torque constant that drifts, where no effect of the library does that, is found twice: in the mean as a torque
 constant that is another one than taken, and over the periods as friction that drifts, which is the nearest that does.
-So every trend is held against the drift of each effect that was found at its joint.
+So every trend is held against the drift of each effect that was found at its joint. An encoder whose zero wanders bends
+the torque of other joints too: what was found in the chain of signals is held against the trends of all joints.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,9 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
+from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import EQUALLY_GOOD, UNEXPLAINED, Trend, TrendTest, trend_excess
 from sea_ident.discrepancy.trend_directions import Cause, Direction, PeriodColumns, courses, flat_periods
@@ -22,6 +25,7 @@ from sea_ident.effects import Column, Contribution, Effect, Side, State
 from sea_ident.effects.drift import DriftEffect
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.load import MotorLoadEffect
+from sea_ident.effects.signal import SignalEffect
 from sea_ident.robot import Robot
 
 
@@ -59,12 +63,19 @@ class Drifting(DriftEffect):
 
 @dataclass(frozen=True)
 class UnnamedDrift(Unnamed):
-    """A trend in the place of which the drift of what was found in the mean explains the periods much better."""
+    """A trend in the place of which the drift of what was found in the mean explains the periods much better.
+
+    Attributes:
+        drifts_at: joint of what drifts, None where it is that of the trend.
+    """
+
+    drifts_at: str | None = None
 
     @property
     def sentence(self) -> str:
         """What it explains."""
-        what = f"That the {self.relative} at {self.joint} drifts explains what changes from period to period"
+        where = self.drifts_at or self.joint
+        what = f"That the {self.relative} at {where} drifts explains what changes from period to period"
         return f"{what}." if self.effect == self.relative else f"{what} better than {self.effect} does."
 
 
@@ -85,17 +96,18 @@ def drifting(
         One entry for every such trend.
     """
     fit, found = now.fit, []
-    mean = [e for e in fit.effects[len(bench.effects) :] if e.columns(bench.robot)]
-    sized = [e for e in mean if e.joint is not None and not is_signal(e) and not isinstance(e, ExternalForce)]
+    mean = [e for e in fit.effects[len(bench.effects) :] if is_signal(e) or e.columns(bench.robot)]
+    sized = [e for e in mean if e.joint is not None and not isinstance(e, ExternalForce)]
     for k, trend in enumerate(trends.trends):
         others = [t for i, t in enumerate(trends.trends) if i != k]
-        own = [e for e in sized if e.joint == trend.effect.joint]
+        own = [e for e in sized if is_signal(e) or e.joint == trend.effect.joint]
         if not own:
             continue
         first, *gains = _Drifts(bench, now, temperature, own).gains(trend, others)
         best = int(np.argmax(gains))
         if gains[best] - first > EQUALLY_GOOD:
-            found.append(UnnamedDrift(trend.effect.name, trend.effect.joint, own[best].name, 0.0, fit.solution))
+            named, drifts_at = trend.effect, own[best].joint
+            found.append(UnnamedDrift(named.name, named.joint, own[best].name, 0.0, fit.solution, drifts_at=drifts_at))
     if trends.unnamed and not trends.trends and sized:
         drifts = _Drifts(bench, now, temperature, sized)
         _, *gains = drifts.gains()
@@ -130,7 +142,10 @@ class _Drifts:
         self._drifts = []
         for effect in effects:
             drift = Drifting(effect.joint, effect=effect)
-            spectra = bench.spectra_of(drift.steady(bench.state(fit.effects)), fit.effects) * fit.scale[:, None]
+            if isinstance(effect, SignalEffect):
+                spectra = _along_amounts(bench, fit, effect)
+            else:
+                spectra = bench.spectra_of(drift.steady(bench.state(fit.effects)), fit.effects) * fit.scale[:, None]
             self._drifts.append(Cause(drift, columns.flat(spectra), None))
         self._space = column_space([*known, *self._drifts])
         numbers = flat @ self._space
@@ -148,3 +163,10 @@ class _Drifts:
         columns = self._scatter @ (self._space.T @ cause.columns)
         every = courses(cause, np.broadcast_to(columns, (len(self._numbers), *columns.shape)), self._middle)
         return max(((gain(self._numbers, d, held)[0], d) for d in every), key=lambda item: item[0])
+
+
+def _along_amounts(bench: Bench, fit: Fit, signal: SignalEffect) -> ComplexArray:
+    """(H + 1, E, k) scaled change of the torque with the amounts of an effect in the chain of signals."""
+    shown = [bench.signal_tangent(signal, amount, fit.effects, fit.parameters) for amount in signal.amounts]
+    torque, slopes = (np.stack(part, axis=-1) for part in zip(*shown, strict=True))
+    return bench.scaled(torque, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))

@@ -8,7 +8,8 @@ named one is not what is there. Whether what the named one leaves stands out of 
 
 What pushes in every period may be a law of the position: the end of the range of a joint, which its motion comes to in
 every pass. So a push is held against such ends, and so is any effect where something is left beside what was found.
-What was found in a spring, or as a push, and leaves something is held against a spring that creeps, too.
+What was found in a spring, or as a push, and leaves something is held against a spring that creeps, too, and what was
+found in an encoder, or as a wave or a spring along the path, against an encoder of another scale.
 
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
@@ -32,6 +33,7 @@ from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.relatives import BehindTheSpring, Relative, behind_the_spring, one_sided, relatives_of
+from sea_ident.discrepancy.scaled_encoders import ScaledEncoder, scaled_encoders
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
@@ -119,7 +121,7 @@ def unnamed(
         own = now.fit.effects[position]
         outside: tuple[Effect, ...] = stops if leaves or isinstance(own, ExternalForce) else ()
         if leaves:
-            outside = (*outside, *creeping(bench, own))
+            outside = (*outside, *creeping(bench, own), *scaled_encoders(bench.robot, own))
         best = _best(bench, now, position, outside)
         return best[0] if best is not None and _holds(best[1], selection, held, position) else None
 
@@ -231,7 +233,7 @@ class _InPlace:
 
 
 def _in_words(relative: Effect) -> str:
-    if isinstance(relative, EndStop | Creep):
+    if isinstance(relative, EndStop | Creep | ScaledEncoder):
         return relative.in_words
     if isinstance(relative, BehindTheSpring):
         return f"{relative.name} on the link"

@@ -1,5 +1,8 @@
 """A drift that the library does not have is not named by what was found of it in the mean and over the periods."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy import Verdict
@@ -9,7 +12,7 @@ from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.drifting import drifting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
-from sea_ident.discrepancy.trend import TrendTest, compare_periods
+from sea_ident.discrepancy.trend import LEVEL, Trend, TrendTest, compare_periods
 from sea_ident.effects import effect_classes, make_effect
 
 
@@ -60,6 +63,25 @@ def test_a_drift_of_the_library_keeps_its_name_beside_what_was_found(laboratory,
     bench, _, now, trends = compared(laboratory, planted, found)
     assert [(t.effect.name, t.effect.joint) for t in trends.trends] == [drift[:2]]
     assert drifting(bench, now, trends) == ()
+
+
+@pytest.mark.scenario
+def test_an_encoder_that_slips_is_no_spring_that_drifts(laboratory):
+    """It shows at other joints too, as the drift of whatever is nearest there."""
+    recording = laboratory.record(periods=8)
+    slip = 1e-3 * np.linspace(0.0, 1.0, recording.samples)
+    slipped = replace(recording, columns={**recording.columns, "q_knee": recording.columns["q_knee"] + slip})
+    bench = laboratory.bench(slipped)
+    start = settle(bench, bench.effects)
+    found = bench.anchored((*start.fit.effects, make_effect("encoder_offset", "knee")), start.fit.parameters)
+    now = settle_again(bench, bench.refine(found, start.noise, start=start.fit.parameters))
+    trends = compare_periods(bench, now.fit)
+    assert trends.p_value < LEVEL
+    nearest = Trend(make_effect("stiffness_drift", "hip"), np.array([-1.0]), np.array([0.1]), 80.0, 1e-9, 0.001)
+    for said in (TrendTest(trends.p_value, (), True), TrendTest(trends.p_value, (nearest,), True)):
+        (one,) = drifting(bench, now, said)
+        assert one.relative == "encoder_offset"
+        assert "That the encoder_offset at knee drifts" in one.sentence
 
 
 @pytest.mark.scenario
