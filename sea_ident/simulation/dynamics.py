@@ -28,6 +28,10 @@ SHRINKING = 0.7
 """Ratio of two changes in turn up to which a load is taken for the sum of a geometric series [-]."""
 
 
+ROUNDING = 1e-12
+"""Coefficients of the method below this are sums that cancel [-]."""
+
+
 class ClosedLoop:
     """Robot, springs, friction and drive, in the coordinates u = (q, theta of the elastic joints).
 
@@ -84,6 +88,7 @@ class ClosedLoop:
         ]
         self._weights = method.weights
         self._nodes = [float(node) * step for node in method.nodes]
+        self._drift = [float(share) * step if abs(share) > ROUNDING else 0.0 for share in method.drift]
         self._increments = np.zeros((stages, 2 * size))
         self._rows = [(row[:size], row[size:]) for row in self._increments]
         self._right = np.zeros(2 * size)
@@ -191,12 +196,14 @@ class ClosedLoop:
 
     # -- one step ----------------------------------------------------------------------------------------------------
 
-    def step(self, time: float, biases: list[list[float]], y: FloatArray) -> FloatArray:
+    def step(self, time: float, biases: list[list[float]], bias_rate: FloatArray, y: FloatArray) -> FloatArray:
         """The state (2 size,) one step later.
 
         Args:
             time: [s].
             biases: torque of the drive at zero state, at each stage.
+            bias_rate: (size,) how fast it changes [N m/s]: gains turn it round with the state, and a step that knew but
+                the one would be off by what a stiff drive makes of the other.
             y: (2 size,) positions and velocities.
         """
         size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
@@ -210,6 +217,7 @@ class ClosedLoop:
         factor, info = dpotrf(matrix)
         if info != 0:
             raise SimulationError(self._not_positive(u))
+        drift = dposv(self._mass, bias_rate)[1]
         self._sides[:, size:] = self._mass
         solve = dpotrs(factor, self._sides)[0]
         rates[:] = w
@@ -223,6 +231,8 @@ class ClosedLoop:
                 rates[:] = w
                 accelerations[:] = self._acceleration(time + elapsed[i], elapsed[i], biases[i], u, w)
                 right += coupling
+            if self._drift[i]:
+                accelerations += self._drift[i] * drift
             row_u, row_w = self._rows[i]
             np.dot(solve, right, out=row_w)
             np.add(rates, row_w, out=row_u)

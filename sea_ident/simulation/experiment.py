@@ -150,7 +150,7 @@ def simulate(
     system = ClosedLoop(plant, drive, motors, links, planted, method, clock.step)
     system.check_mass(state)
     system.accept(follow.begin - (lead_samples * clock.interval or clock.duration), state)
-    passes = Passes(system, drive, clock, len(method.nodes), follow.begin)
+    passes = Passes(system, drive, clock, method.nodes, follow.begin)
 
     # -- settle, then record
     warnings = list(plant.notes)

@@ -56,9 +56,13 @@ class Clock:
 class Passes:
     """A closed loop on its way through time."""
 
-    def __init__(self, system: ClosedLoop, drive: Drive, clock: Clock, stages: int, begin: float) -> None:
+    def __init__(self, system: ClosedLoop, drive: Drive, clock: Clock, nodes: FloatArray, begin: float) -> None:
+        stages, later = len(nodes), float(nodes[1])
         self._system, self._clock, self._begin = system, clock, begin
-        self._biases: list[list[list[float]]] = drive.bias.reshape(-1, stages, system.n).tolist()
+        biases = drive.bias.reshape(-1, stages, system.n)
+        self._biases: list[list[list[float]]] = biases.tolist()
+        self._bias_rates = np.zeros((len(biases), system.size))
+        self._bias_rates[:, system.motor] = (biases[:, 1] - biases[:, 0]) / (later * clock.step)
         self._states: list[FloatArray] = []
         self._accelerations: list[FloatArray] = []
         self._tau_motor: list[list[float]] = []
@@ -79,7 +83,7 @@ class Passes:
         self._keep(self._begin + self._clock.duration, len(self._biases) - 1, state)
 
     def _run(self, state: FloatArray, begin: float, first: int = 0, *, keep: bool) -> FloatArray:
-        system, biases, h = self._system, self._biases, self._clock.step
+        system, biases, rates, h = self._system, self._biases, self._bias_rates, self._clock.step
         k = before = first * self._clock.substeps
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges is told as such
             for _ in range(first, self._clock.samples):
@@ -87,7 +91,7 @@ class Passes:
                     self._keep(begin + k * h, k, state)
                 for _ in range(self._clock.substeps):
                     try:
-                        state = system.step(begin + k * h, biases[k], state)
+                        state = system.step(begin + k * h, biases[k], rates[k], state)
                     except (SimulationError, OverflowError) as error:
                         raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
                     k += 1

@@ -17,6 +17,7 @@ class RosenbrockW:
         stage: (s, s) coefficients of the stage values.
         coupling: (s, s) coefficients of the right-hand sides.
         weights: (s,) coefficients of the result.
+        drift: (s,) coefficients of the change of the right-hand side with time alone.
         order: order of convergence.
     """
 
@@ -25,6 +26,7 @@ class RosenbrockW:
     stage: FloatArray
     coupling: FloatArray
     weights: FloatArray
+    drift: FloatArray
     order: int
 
     @staticmethod
@@ -38,6 +40,7 @@ class RosenbrockW:
             alpha @ inverse,
             np.eye(len(weights)) / diagonal - inverse,
             weights @ inverse,
+            gamma.sum(axis=1),
             order,
         )
 
