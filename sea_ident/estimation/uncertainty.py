@@ -11,7 +11,6 @@ from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators import Estimate
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.period_scores import period_scores
-from sea_ident.processing.harmonics import within
 
 FEWEST_BLOCKS = 20
 """Smallest number of pieces of a period from which a covariance is estimated."""
@@ -125,13 +124,14 @@ def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArra
     """Covariance from the part of the mean residual that repeats in every period, so is no noise.
 
     It is treated as a random error with the correlation that the residual shows along the period: that is what an
-    interval can say of a model error that nobody has named. Only the harmonics that move the estimate count.
+    interval can say of a model error that nobody has named. Only what moves the estimate counts.
     """
     mean = observations.residual(estimate.values)
     if estimate.period_torque is not None:
         mean = mean + estimate.period_torque.mean(axis=0) - observations.torque
-    mean = within(mean, estimate.harmonics)
-    residuals = np.stack([within(own, estimate.harmonics) for own in residuals])
+    if estimate.band is not None:
+        mean = estimate.band.part_of(mean)
+        residuals = np.stack([estimate.band.part_of(own) for own in residuals])
     periods = len(residuals)
     noise = (residuals**2).sum(axis=0) / (periods * (periods - 1.0))
     noise_energy, energy = (estimate.weights * noise).sum(axis=0), (estimate.weights * mean**2).sum(axis=0)

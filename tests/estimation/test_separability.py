@@ -88,7 +88,7 @@ def test_what_is_hardly_told_apart_still_has_a_covariance():
         first = SimpleNamespace(
             variance=variance, weights=None, solution=SimpleNamespace(log_det=0.0), notes=(), warnings=()
         )
-        found = _estimate(first, np.zeros(2), instruments, cross, 0, "").covariance
+        found = _estimate(first, np.zeros(2), instruments, cross, None, "").covariance
         # in the coordinates of the two directions nothing is nearly singular
         plain = np.stack([shared, own], axis=2)
         gram = np.linalg.inv(np.einsum("knb,knc->bc", plain, plain))

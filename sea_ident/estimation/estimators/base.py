@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
+from sea_ident.estimation.estimators.band import Band
 from sea_ident.estimation.observations import Observations
 from sea_ident.motion import Motion
 
@@ -24,7 +25,7 @@ class Estimate:
         log_det_weighted: natural logarithm of det F' Sigma^-1 F.
         period_torque: (P, N, n) torques that were used in place of the measured ones, None where those were used.
         motion: motion that was used in place of the mean one, None where that was used.
-        harmonics: of the residuals that move the estimate; 0 where all do.
+        band: of the residuals that move the estimate; None where all do.
         notes: what was done.
         warnings: what a user should know.
     """
@@ -37,7 +38,7 @@ class Estimate:
     log_det_weighted: float
     period_torque: FloatArray | None = None
     motion: Motion | None = None
-    harmonics: int = 0
+    band: Band | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.estimation.estimators.band import Band
 from sea_ident.estimation.estimators.base import Estimate, Estimator
 from sea_ident.estimation.estimators.weights import SampleWeights, sample_weights, steady
 from sea_ident.estimation.observations import Observations
@@ -25,8 +26,14 @@ LACKING = 2.0
 LOSS = 1.1
 """Standard deviation by eq. 13 within the harmonics of theta over that of all, up to which only those count."""
 
+LOSS_BESIDE = 1.3
+"""The same where the samples around reversals are left out, too, and with them what they leave in every period."""
+
 GAIN = 0.5
 """The same ratio from which on: below, columns are told apart by rounding and noise only."""
+
+MOST_LEFT_OUT = 0.3
+"""Share of the samples of a joint around reversals up to which the equations are solved without."""
 
 LEAST_TOLD = 1e-13
 """Smallest singular value of the products of normalised columns that double precision tells from nothing."""
@@ -82,7 +89,7 @@ class InstrumentalVariables(Estimator):
                     f"the simulated motion has {len(motion)} samples, the mean period has {len(rows)}; give it at the "
                     "times of the mean motion"
                 )
-            instruments = within(within(observations.rows_of(motion).total, band) * weights[:, :, None], band)
+            instruments = _part(_part(observations.rows_of(motion).total, band) * weights[:, :, None], band)
             cross = _invertible(instruments.reshape(-1, count).T @ flat)
             before, values = values, np.linalg.solve(cross, np.einsum("knb,kn->b", instruments, torque))
             moved = float(np.max(np.abs(values - before) / np.maximum(np.abs(values), 1e-12)))
@@ -103,44 +110,62 @@ def _other_periods(observations: Observations, first: SampleWeights) -> Estimate
     whole = np.zeros_like(observations.rows)
     for rows in observations.each_period():
         whole += rows.total
-    whole = within(whole, band)
+    whole = _part(whole, band)
     cross, side = np.zeros((count, count)), np.zeros(count)
     for p, rows in enumerate(observations.each_period()):
-        own = within(rows.total, band)
+        own = _part(rows.total, band)
         instruments = (whole - own) / (periods - 1.0) * weights[:, :, None]
         cross += instruments.reshape(-1, count).T @ own.reshape(-1, count)
-        side += np.einsum("knb,kn->b", instruments, within(processed.period_tau_motor[p], band))
+        side += np.einsum("knb,kn->b", instruments, _part(processed.period_tau_motor[p], band))
     cross = _invertible(cross)
     values: FloatArray = np.asarray(np.linalg.solve(cross, side), dtype=np.float64)
-    mean_instruments = within(whole / periods * weights[:, :, None], band)
+    mean_instruments = _part(whole / periods * weights[:, :, None], band)
     note = "the instruments of every period are the regressors of the other periods"
     return _estimate(first, values, mean_instruments, cross / periods, band, note)
 
 
-def _band(observations: Observations, first: SampleWeights) -> int:
-    """Harmonics of the equations that count; 0 where all do: nothing is lacking beyond, or much is told there.
+def _part(values: FloatArray, band: Band | None) -> FloatArray:
+    return values if band is None else band.part_of(values)
+
+
+def _band(observations: Observations, first: SampleWeights) -> Band | None:
+    """What counts of the equations; None where all does: nothing is lacking beyond theta, or much is told there.
 
     A motor that jerks has so many harmonics that little is lost. One that does not may have a few only; then most of
-    what tells friction lies beyond them, and its acceleration lacks nothing.
+    what tells friction lies beyond them, and its acceleration lacks nothing. Links have fewer harmonics than motors: what
+    lies between is tried first without, as there the equations lack the acceleration of the links.
     """
-    processed, harmonics = observations.processed, observations.processed.motor_harmonics
-    if processed.periods < FEWEST_PERIODS or not 0 < harmonics < processed.samples // 2:
-        return 0
+    processed, motors = observations.processed, observations.processed.motor_harmonics
+    samples, nowhere = processed.samples, np.zeros(observations.torque.shape, dtype=np.bool_)
+    if processed.periods < FEWEST_PERIODS or not 0 < motors < samples // 2:
+        return None
     values = first.solution.values
     mean, residuals = observations.residual(values), observations.period_residuals(values)
     residuals = residuals - residuals.mean(axis=0)
-    noise = sum(_energy(residual, harmonics) for residual in residuals) / (
-        processed.periods * (processed.periods - 1.0)
-    )
-    if not np.any(_energy(mean, harmonics) > LACKING * noise):
-        return 0
+    noise = sum(_energy(residual, motors) for residual in residuals) / (processed.periods * (processed.periods - 1.0))
+    if not np.any(_energy(mean, motors) > LACKING * noise):
+        return None
+    # a joint that never moves has nothing beside its rest
+    around = ~observations.judged & np.any(observations.judged, axis=0)
+    fewest = min(motors, processed.link_harmonics or motors)
+    for band in (Band(samples, fewest, around), Band(samples, motors, around), Band(samples, motors, nowhere)):
+        if _tells(observations, first, band):
+            return band
+    return None
+
+
+def _tells(observations: Observations, first: SampleWeights, band: Band) -> bool:
+    """Whether the standard deviations by eq. 13 from this part of the equations are about those from all of them."""
+    if band.left_out.mean(axis=0).max() > MOST_LEFT_OUT:
+        return False
     rows, count = observations.rows, observations.base.rank
-    instruments = within(within(rows, harmonics) * first.weights[:, :, None], harmonics)
+    instruments = band.part_of(band.part_of(rows) * first.weights[:, :, None])
     inverse = np.linalg.inv(_invertible(instruments.reshape(-1, count).T @ rows.reshape(-1, count)))
     moves = instruments @ inverse.T
     variance = np.einsum("knb,kn,knb->b", moves, first.variance, moves)
     ratio = variance / np.diag(first.solution.inverse)
-    return harmonics if np.all((ratio <= LOSS**2) & (ratio >= GAIN**2)) else 0
+    most = LOSS_BESIDE if np.any(band.left_out) else LOSS
+    return bool(np.all((ratio <= most**2) & (ratio >= GAIN**2)))
 
 
 def _energy(residual: FloatArray, harmonics: int) -> FloatArray:
@@ -163,7 +188,7 @@ def _invertible(cross: FloatArray) -> FloatArray:
 
 
 def _estimate(
-    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, band: int, note: str
+    first: SampleWeights, values: FloatArray, instruments: FloatArray, cross: FloatArray, band: Band | None, note: str
 ) -> Estimate:
     """Values with their covariance by eq. 13, from instruments (N, n, b) and their products with the rows (b, b)."""
     inverse: FloatArray = np.asarray(np.linalg.inv(cross), dtype=np.float64)
@@ -176,7 +201,7 @@ def _estimate(
         weights=first.weights,
         covariance=moves.T @ moves,
         log_det_weighted=first.solution.log_det,
-        harmonics=band,
+        band=band,
         notes=(*first.notes, note),
         warnings=first.warnings,
     )
