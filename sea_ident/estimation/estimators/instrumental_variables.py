@@ -26,7 +26,7 @@ LACKING = 2.0
 LOSS = 1.1
 """Standard deviation by eq. 13 within the harmonics of theta over that of all, up to which only those count."""
 
-LOSS_BESIDE = 1.3
+LOSS_BESIDE = 1.5
 """The same where the samples around reversals are left out, too, and with them what they leave in every period."""
 
 GAIN = 0.5
@@ -49,9 +49,11 @@ class InstrumentalVariables(Estimator):
 
     At every reversal friction makes the motor jerk. What its acceleration lacks beyond the harmonics that theta was
     fitted by is the same in every period: no average takes it away, no spread between periods shows it, and it has the
-    shape of friction. So only the harmonics of theta count, in the torque as in the regressor: within them the
-    acceleration lacks nothing. Where the residual beyond them is noise, or they are so few that a standard deviation
-    would grow by a tenth, all count.
+    shape of friction. So only the harmonics of theta count, or those of q where these are fewer, in the torque as in
+    the regressor. Within them the acceleration lacks nothing but what the samples beside a reversal make of a jump that
+    falls between them, and friction follows a speed that does not bend as sharply as that of the motor. Both are there
+    and then, so that instruments that vanish around reversals do not see them, see `Band`. Where the residual beyond
+    the harmonics is noise, or a standard deviation would grow by half (by a tenth where reversals stay), all count.
 
     Attributes:
         simulator: gives the motion that the closed loop makes with given parameters.
@@ -132,8 +134,8 @@ def _band(observations: Observations, first: SampleWeights) -> Band | None:
     """What counts of the equations; None where all does: nothing is lacking beyond theta, or much is told there.
 
     A motor that jerks has so many harmonics that little is lost. One that does not may have a few only; then most of
-    what tells friction lies beyond them, and its acceleration lacks nothing. Links have fewer harmonics than motors: what
-    lies between is tried first without, as there the equations lack the acceleration of the links.
+    what tells friction lies beyond them, and its acceleration lacks nothing. Links mostly have fewer harmonics than
+    motors: between, the equations lack the acceleration of the links, so without that is tried first.
     """
     processed, motors = observations.processed, observations.processed.motor_harmonics
     samples, nowhere = processed.samples, np.zeros(observations.torque.shape, dtype=np.bool_)
