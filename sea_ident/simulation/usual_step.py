@@ -19,8 +19,8 @@ SHORTEST = 5e-4
 TIMES_BRAKING = 3.0
 """Times as long as the time in which friction at its steepest brakes a joint that a step may be [-].
 
-Positions of legs and of arms are then within 5e-5 rad of those with steps of a twentieth, most within 1e-5. Steps of 15
-times that time throw a joint back before it reverses: a first stage does not see how steep friction is going to be."""
+Positions of legs and of arms are then within 1e-5 rad of those with steps of a twentieth, also where motions are fast.
+The first stage of a much longer step does not see how steep friction is going to be where a joint reverses."""
 
 PLACES = 16
 """Configurations along the reference at which the inertia is looked at."""
