@@ -86,6 +86,9 @@ def remembering(bench: Bench, selection: Selection, held: HeldOut, position: int
     failed = found.excess if found.share > CONFIRMED else min((1.0 - found.share) * found.possible, found.excess)
     if best is None or found.excess - best[0] < MOST_OF_IT * failed:
         return None
+    # the best of many takes some of what is noise there
+    if found.excess - best[0] < (EQUALLY_GOOD + 2.0 * np.log(len(fits))) * found.unit:
+        return None
     return Alternative(SpringHysteresis.name, effect.joint, 1.0, fits[best[1]], dearer=True)
 
 
