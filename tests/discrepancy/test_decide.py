@@ -261,7 +261,7 @@ def test_what_is_in_the_model_is_no_alternative_to_another_part_of_it(rivals):
 @pytest.mark.scenario
 def test_what_is_ruled_out_makes_room_for_what_it_stood_in_for(laboratory):
     """The wrong friction at the knee does not hold on the other motion: the search goes on beside what does."""
-    planted = [("torque_ripple", "hip", [3.0, 1.5], {"order": 4.0}), ("load_dependent_friction", JOINT, [0.05], {})]
+    planted = [("torque_ripple", "hip", [3.0, 1.5], {"order": 4.0}), ("load_dependent_friction", JOINT, [0.08], {})]
     bench = laboratory.bench(laboratory.record(planted, periods=10))
     start = settle(bench, bench.effects)
     found = {(c.effect.name, c.effect.joint): c.effect for c in scan(bench, start.fit, start.noise)}
