@@ -31,7 +31,10 @@ SHORTEST = 0.01
 
 CLEAR_AT_REVERSAL = 0.06
 """Around a reversal friction that differs from pass to pass departs while the joint hardly moves, and for up to this
-beyond [s]: what is shorter counts only beside pushes that are clear."""
+beyond [s]: what is shorter counts only beside pushes that are clear, ..."""
+
+AS_LONG = 0.5
+"""... and where it lasts at least for this share of the shortest of them [-]."""
 
 SLOW = 0.02
 """Share of the rms speed of a joint below which it hardly moves."""
@@ -169,7 +172,8 @@ def _runs(
     joined = binary_dilation(low & near, iterations=max(1, gap // 4))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], joined.astype(int), [0]])))
     found: list[Push] = []
-    clear, beside = False, 0
+    doubtful: list[Push] = []
+    shortest, beside = np.inf, 0
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         inside = np.flatnonzero((low & near)[first:last]) + first
         if not np.any(high[first:last]):
@@ -188,16 +192,15 @@ def _runs(
         span = slice(begin, end + 1)
         z = float(abs(smooth[peak]) / spread)
         moving = length - interval * np.count_nonzero(slow[span])
-        if departure_p(z, len(time)) < DEPARTURE_LEVEL:
-            clear = bool(clear or not reversing[peak] or moving >= CLEAR_AT_REVERSAL)
         beside += int(reversing[peak])
-        found.append(
-            Push(
-                joint, float(time[begin]), float(time[end]), float(smooth[peak]),
-                float(own[span].sum() * interval), z,
-            )
-        )  # fmt: skip
+        impulse = float(own[span].sum() * interval)
+        found.append(Push(joint, float(time[begin]), float(time[end]), float(smooth[peak]), impulse, z))
+        at_friction = reversing[peak] and moving < CLEAR_AT_REVERSAL
+        if at_friction:
+            doubtful.append(found[-1])
+        elif departure_p(z, len(time)) < DEPARTURE_LEVEL:
+            shortest = min(shortest, found[-1].stop - found[-1].start)
     friction = len(found) >= MANY and beside > MOST * len(found)
-    if friction or not clear or sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
+    if friction or shortest == np.inf or sum(p.stop - p.start for p in found) > LONGEST * (time[-1] - time[0]):
         return []
-    return found
+    return [p for p in found if p not in doubtful or p.stop - p.start >= AS_LONG * shortest]

@@ -72,6 +72,18 @@ def test_departures_that_come_beside_reversals_are_friction_even_where_one_lasts
     assert len(find_pushes(TIME, anywhere, SPEED, SAMPLES)) == 8
 
 
+def test_friction_that_lets_go_for_some_samples_is_none_beside_a_push_that_is_clear():
+    turns = np.flatnonzero(np.diff(np.sign(SPEED[:, 1])) != 0.0)[1:-1]
+    values = residual()
+    values[turns[3] - 1 : turns[3] + 2, 1] += 1.5
+    values[turns[5] + 100 : turns[5] + 130, 1] += 1.5
+    (push,) = find_pushes(TIME, values, SPEED, SAMPLES)
+    assert push.start == pytest.approx(TIME[turns[5] + 100], abs=1.01 * INTERVAL)
+    # one that lasts about as long as those that are clear is one of them, wherever it comes
+    values[turns[7] - 10 : turns[7] + 10, 1] += 1.5
+    assert len(find_pushes(TIME, values, SPEED, SAMPLES)) == 2
+
+
 def test_what_lasts_for_most_of_the_time_is_a_poor_model():
     values = residual()
     values[500:2500, 0] += 2.0
