@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from estimation.legs import LIGHT_ROTORS
 from sea_ident.estimation import identify
 from sea_ident.estimation.estimators import weights
 from sea_ident.motion import FourierSeries
@@ -11,27 +12,6 @@ from sea_ident.simulation import Settling, simulate
 
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 PERIODS, PERIOD = 4, 5.0
-LINK = (
-    '<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>'
-    '<inertia ixx="{3}" iyy="{3}" izz="{4}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-)
-JOINT = (
-    '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"/><axis xyz="0 1 0"/>'
-    '<limit lower="-3" upper="3" velocity="9" effort="80"/></joint>'
-    '<transmission name="{0}_t" type="sea_ident/SeriesElastic"><joint name="{0}"/><actuator name="{0}_m">'
-    "<mechanicalReduction>4</mechanicalReduction><torqueConstant>0.9</torqueConstant><rotorInertia>{4}</rotorInertia>"
-    "<viscousFriction>{5}</viscousFriction><coulombFriction>{6}</coulombFriction></actuator>"
-    '<seriesElastic stiffness="{7}" damping="{8}"/></transmission>'
-)
-LEG = (
-    '<robot name="light_rotors"><link name="pelvis"/>'
-    + LINK.format("thigh", "0.02 0 -0.19", 4.2, 0.06, 0.015)
-    + LINK.format("shank", "-0.01 0 -0.15", 2.3, 0.03, 0.006)
-    + JOINT.format("hip", "pelvis", "thigh", "0 0 0.9", 0.004, 0.8, 1.0, 500, 1.0)
-    + JOINT.format("knee", "thigh", "shank", "0 0 -0.4", 0.003, 0.4, 0.5, 180, 0.5)
-    + "</robot>"
-)
-"""Motors of low gear ratio, whose inertia is small beside their friction."""
 
 
 COSINES = [[1.29, 0.0, -2.58, 0.0, -2.42], [0.04, 0.15, 0.34, 0.61, -1.71]]
@@ -43,7 +23,7 @@ SINES = [[-2.05, 0.0, -0.31, 0.0, -7.24], [0.75, 1.52, 2.31, 3.14, -6.97]]
 def pieces(tmp_path_factory):
     """The leg, and six recordings of four periods of it."""
     file = tmp_path_factory.mktemp("leg") / "leg.urdf"
-    file.write_text(LEG)
+    file.write_text(LIGHT_ROTORS)
     robot = load_robot(file)
     series = FourierSeries(1.0 / PERIOD, np.array([0.0, -0.32]), np.array(COSINES), np.array(SINES))
     found = []

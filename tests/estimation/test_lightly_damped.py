@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from estimation.legs import SWINGING
 from sea_ident.estimation import identify
 from sea_ident.motion import FourierSeries
 from sea_ident.recordings import Recording
@@ -16,33 +17,11 @@ SEEDS = range(12)
 ENCODER, TORQUE = 1e-5, 0.02
 """Standard deviations of the noise [rad] and [N m]."""
 
-LINK = (
-    '<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>'
-    '<inertia ixx="{3}" iyy="{3}" izz="{4}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-)
-JOINT = (
-    '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"/><axis xyz="0 1 0"/>'
-    '<limit lower="-1.5" upper="1.5" velocity="9" effort="100"/></joint>'
-    '<transmission name="{0}_t" type="sea_ident/SeriesElastic"><joint name="{0}"/><actuator name="{0}_m">'
-    "<mechanicalReduction>{4}</mechanicalReduction><rotorInertia>1e-5</rotorInertia>"
-    "<viscousFriction>{5}</viscousFriction><coulombFriction>{6}</coulombFriction></actuator>"
-    '<seriesElastic stiffness="{7}" damping="{8}"/></transmission>'
-)
-LEG = (
-    '<robot name="swinging"><link name="pelvis"/>'
-    + LINK.format("thigh", "0.01 0.005 -0.2", 3.0, 0.04, 0.005)
-    + LINK.format("shank", "0.01 0.002 -0.12", 0.8, 0.004, 0.001)
-    + JOINT.format("hip", "pelvis", "thigh", "0 0 0", 100, 0.8, 1.5, 900, 0.3)
-    + JOINT.format("knee", "thigh", "shank", "0 0 -0.4", 80, 0.4, 0.6, 500, 0.05)
-    + "</robot>"
-)
-"""Damped by less than a hundredth of what is critical; links swing at 9 and 28 Hz."""
-
 
 @pytest.fixture(scope="module")
 def leg(tmp_path_factory):
     file = tmp_path_factory.mktemp("leg") / "leg.urdf"
-    file.write_text(LEG)
+    file.write_text(SWINGING)
     return load_robot(file)
 
 
