@@ -49,14 +49,26 @@ def _gained(reference: Motion, feedforward: FloatArray, position_gain: FloatArra
     return Drive(bias, position_gain, velocity_gain, reference)
 
 
-def reference_inertia(robot: Robot, q: FloatArray) -> FloatArray:
-    """(n,) mean inertia that each motor moves with all springs stiff, over configurations (N, n) [kg m2]."""
+CONFIGURATIONS = 50
+"""Along a reference over which the inertia that sets the gains is averaged."""
+
+SAMPLES = 1000
+"""Of a reference that say how far it moves a joint."""
+
+
+def reference_inertia(robot: Robot, reference: Reference) -> FloatArray:
+    """(n,) mean inertia that each motor moves with all springs stiff, over a reference of links [kg m2]."""
     total = np.zeros(robot.n)
-    chosen = q[:: max(1, len(q) // 50)]
-    for sample in chosen:
+    for sample in _along(reference, CONFIGURATIONS).q:
         h, s, b = robot.mass_matrices(sample)
         total += np.diag(h + s + s.T + b)
-    return total / len(chosen)
+    return total / CONFIGURATIONS
+
+
+def _along(reference: Reference, count: int) -> Motion:
+    """(count, n) the reference at so many times: gains must not depend on the steps of the integrator."""
+    times = np.linspace(0.0, reference.duration, count, endpoint=False, dtype=np.float64)
+    return reference.motion(times)
 
 
 HIGHEST_GAIN = 100.0
@@ -93,8 +105,8 @@ class VelocityController(Controller):
     def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
         """The drive at the times (N,) [s]."""
         motion = reference.motion(time)
-        velocity_gain = reference_inertia(robot, motion.q) * self.bandwidth
-        allowed = self.held_back * self.correction * motion.theta.std(axis=0)
+        velocity_gain = reference_inertia(robot, reference) * self.bandwidth
+        allowed = self.held_back * self.correction * _along(reference, SAMPLES).theta.std(axis=0)
         overcoming = _known_coulomb_friction(robot) / np.maximum(allowed, 1e-12)
         velocity_gain = np.clip(overcoming, velocity_gain, HIGHEST_GAIN * velocity_gain)
         torque = np.zeros_like(motion.q)
@@ -143,5 +155,5 @@ class ComputedTorque(Controller):
         """The drive at the times (N,) [s]."""
         model = plant_from_robot(robot) if self.model is None else self.model
         motion, torque = elastic_inverse(model, reference, time, self.smoothing)
-        velocity_gain = reference_inertia(model.robot, motion.q) * self.bandwidth
+        velocity_gain = reference_inertia(model.robot, reference) * self.bandwidth
         return _gained(motion, torque, velocity_gain * self.correction, velocity_gain)

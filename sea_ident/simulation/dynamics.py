@@ -32,6 +32,32 @@ ROUNDING = 1e-12
 """Coefficients of the method below this are sums that cancel [-]."""
 
 
+class Step:
+    """What steps of one length need of the method, and of the linear part of a closed loop.
+
+    Args:
+        method: of integration.
+        length: [s].
+        stiffness: (size, size) of gains and springs.
+        damping: (size, size) the same.
+    """
+
+    def __init__(self, method: RosenbrockW, length: float, stiffness: FloatArray, damping: FloatArray) -> None:
+        self.length, self.hgamma, stages = length, length * method.gamma, len(method.weights)
+        # One product gives the stage value and the coupling of the right-hand side.
+        self.combine = [
+            np.ascontiguousarray(np.stack([method.stage[i, :i], method.coupling[i, :i] / length]))
+            for i in range(stages)
+        ]
+        self.weights, self.error = method.weights, method.error
+        self.nodes = [float(node) * length for node in method.nodes]
+        self.drift = [float(share) * length if abs(share) > ROUNDING else 0.0 for share in method.drift]
+        self.implicit = damping + self.hgamma * stiffness
+        size = len(stiffness)
+        self.sides = np.zeros((size, 2 * size), order="F")
+        self.sides[:, :size] = -self.hgamma * stiffness
+
+
 class ClosedLoop:
     """Robot, springs, friction and drive, in the coordinates u = (q, theta of the elastic joints).
 
@@ -47,10 +73,9 @@ class ClosedLoop:
         link_friction: Sequence[JointFriction | None],
         planted: PlantedTorques | None,
         method: RosenbrockW,
-        step: float,
     ) -> None:
         robot = plant.robot
-        self.plant, self.step_size, self.planted = plant, step, planted
+        self.plant, self.planted, self._method = plant, planted, method
         self.n = n = robot.n
         self.elastic = [int(i) for i in robot.elastic_indices]
         self.motor = motor_coordinates(robot)
@@ -79,24 +104,11 @@ class ClosedLoop:
         k1, k3, d = plant.stiffness.tolist(), plant.cubic_stiffness.tolist(), plant.spring_damping.tolist()
         self._numbers = list(zip(range(n), self.motor, kp, kd, k1, k3, d, strict=True))
         self.replace_motor_friction(motor_friction)
-        stages = len(method.weights)
-        self._stages = stages
-        self._hgamma = step * method.gamma
-        # One product gives the stage value and the coupling of the right-hand side.
-        self._combine = [
-            np.ascontiguousarray(np.stack([method.stage[i, :i], method.coupling[i, :i] / step])) for i in range(stages)
-        ]
-        self._weights = method.weights
-        self._nodes = [float(node) * step for node in method.nodes]
-        self._drift = [float(share) * step if abs(share) > ROUNDING else 0.0 for share in method.drift]
-        self._increments = np.zeros((stages, 2 * size))
-        self._rows = [(row[:size], row[size:]) for row in self._increments]
+        self._linear = self._linear_part(kp, kd, k1, d)
+        self.increments = np.zeros((len(method.weights), 2 * size))
+        self._rows = [(row[:size], row[size:]) for row in self.increments]
         self._right = np.zeros(2 * size)
         self._rates, self._accelerations = self._right[:size], self._right[size:]
-        stiffness, damping = self._linear_part(kp, kd, k1, d)
-        self._implicit = damping + self._hgamma * stiffness
-        self._sides = np.zeros((size, 2 * size), order="F")
-        self._sides[:, :size] = -self._hgamma * stiffness
         self._evaluated: FloatArray | None = None
         self._mass = np.zeros((size, size))
         self.acceleration = np.zeros(size)
@@ -196,48 +208,56 @@ class ClosedLoop:
 
     # -- one step ----------------------------------------------------------------------------------------------------
 
-    def step(self, time: float, biases: list[list[float]], bias_rate: FloatArray, y: FloatArray) -> FloatArray:
-        """The state (2 size,) one step later.
+    def steps(self, length: float) -> Step:
+        """What steps of a length [s] need."""
+        return Step(self._method, length, *self._linear)
+
+    def step(
+        self, of: Step, time: float, biases: list[list[float]], bias_rate: FloatArray, y: FloatArray
+    ) -> FloatArray:
+        """The state (2 size,) one step later; `increments` are then those of its stages.
 
         Args:
+            of: the length of the step.
             time: [s].
             biases: torque of the drive at zero state, at each stage.
             bias_rate: (size,) how fast it changes [N m/s]: gains turn it round with the state, and a step that knew but
                 the one would be off by what a stiff drive makes of the other.
             y: (2 size,) positions and velocities.
         """
-        size, hgamma, increments, elapsed = self.size, self._hgamma, self._increments, self._nodes
+        size, hgamma, increments, elapsed = self.size, of.hgamma, self.increments, of.nodes
         rates, accelerations, right = self._rates, self._accelerations, self._right
         if self._evaluated is not y:
             self.evaluate(time, biases[0], y)
         u, w = y[:size], y[size:]
         matrix = self._mass * (1.0 / hgamma)
-        matrix += self._implicit
+        matrix += of.implicit
         matrix.reshape(-1)[:: size + 1] += self._damping(time, u, w)
         factor, info = dpotrf(matrix)
         if info != 0:
             raise SimulationError(self._not_positive(u))
         drift = dposv(self._mass, bias_rate)[1]
-        self._sides[:, size:] = self._mass
-        solve = dpotrs(factor, self._sides)[0]
+        of.sides[:, size:] = self._mass
+        solve = dpotrs(factor, of.sides)[0]
         rates[:] = w
         accelerations[:] = self.acceleration
-        for i in range(self._stages):
+        self._evaluated = None  # the stages leave torques of their own behind
+        for i in range(len(increments)):
             if i > 0:
-                shift, coupling = self._combine[i].dot(increments[:i])
+                shift, coupling = of.combine[i].dot(increments[:i])
                 stage = y + shift
                 u, w = stage[:size], stage[size:]
                 self._find_load(time + elapsed[i], elapsed[i], biases[i], u, w, LOAD_ROUNDS)
                 rates[:] = w
                 accelerations[:] = self._acceleration(time + elapsed[i], elapsed[i], biases[i], u, w)
                 right += coupling
-            if self._drift[i]:
-                accelerations += self._drift[i] * drift
+            if of.drift[i]:
+                accelerations += of.drift[i] * drift
             row_u, row_w = self._rows[i]
             np.dot(solve, right, out=row_w)
             np.add(rates, row_w, out=row_u)
             row_u *= hgamma
-        result: FloatArray = y + self._weights.dot(increments)
+        result: FloatArray = y + of.weights.dot(increments)
         return result
 
     def _find_load(

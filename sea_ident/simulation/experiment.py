@@ -25,7 +25,7 @@ from sea_ident.simulation.reference import HasSeries, Reference, as_reference
 from sea_ident.simulation.result import Simulation
 from sea_ident.simulation.rosenbrock import ros34pw2
 from sea_ident.simulation.sensors import SensorNoise, WarmUp, sensed_columns
-from sea_ident.simulation.usual_step import usual_step
+from sea_ident.simulation.usual_step import LONGEST_BETWEEN, usual_step
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,8 @@ def simulate(
     of the encoders.
 
     The default step resolves how the friction turns over where a joint reverses: halving it changes the positions of
-    legs and of arms by less than 5e-5 rad, mostly 1e-5; the error falls with the third power of the step.
+    legs and of arms by less than 5e-5 rad, mostly 1e-5; the error falls with the third power of the step. Between
+    reversals, and while the integrator finds no larger error, steps are 5 ms long.
 
     Args:
         robot: the robot as the controller knows it, and the plant unless one is given.
@@ -88,8 +89,8 @@ def simulate(
         effects: what else acts.
         warm_up: temperature of the motors; not simulated by default.
         rate: samples per second [Hz]; a whole number per period is taken.
-        step: longest step of the integrator [s]; a whole number per sample is taken. 2.5 ms by default, down to 0.5 ms
-            where much friction turns over quickly at a joint of little inertia.
+        step: longest step of the integrator [s]; a whole number per sample is taken. By default 5 ms between reversals
+            and 2.5 ms around them, down to 0.5 ms where much friction turns over quickly at a joint of little inertia.
         settling: when the motion counts as periodic.
         start: its first sample is the initial state, and nothing is settled; by default a Fourier series is settled,
             and a Motion starts with its own velocity and the links in static equilibrium.
@@ -123,10 +124,12 @@ def simulate(
     plant = plant.replace(robot=altered_robot(plant.robot, effects))
     follow = as_reference(robot, reference)
     laws = _per_joint(robot, friction or SmoothCoulomb.usual(robot))
+    longest = LONGEST_BETWEEN if step is None else step
     step = usual_step(plant, laws, follow) if step is None else step
     _check_size(follow, rate, step)
-    clock, method = Clock.build(follow, rate, step), ros34pw2()
-    drive = (controller or VelocityController()).drive(robot, follow, clock.stage_times(method.nodes))
+    clocks, method = Clock.short_and_long(follow, rate, step, longest), ros34pw2()
+    clock, times = clocks[0], np.concatenate([each.stage_times(method.nodes) for each in clocks])
+    drive = (controller or VelocityController()).drive(robot, follow, times)
     state = _initial_state(plant, drive, start)
     lead_samples = _lead_samples(lead, start, follow, clock)
     streams = np.random.SeedSequence(seed).spawn(2)
@@ -147,10 +150,10 @@ def simulate(
     planted = PlantedTorques(plant.robot, effects, follow.begin) if effects else None
     if planted is not None and planted.idle:
         planted = None
-    system = ClosedLoop(plant, drive, motors, links, planted, method, clock.step)
+    system = ClosedLoop(plant, drive, motors, links, planted, method)
     system.check_mass(state)
     system.accept(follow.begin - (lead_samples * clock.interval or clock.duration), state)
-    passes = Passes(system, drive, clock, method.nodes, follow.begin)
+    passes = Passes(system, drive, clocks, method.nodes, follow.begin)
 
     # -- settle, then record
     warnings = list(plant.notes)

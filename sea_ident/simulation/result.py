@@ -26,8 +26,8 @@ class Simulation:
         periods: number of recorded periods, 1 where the reference does not repeat.
         settling_periods: periods that were simulated before the recording.
         settled: largest change of a position over the last settling period [rad] or [m]; NaN without settling.
-        step: step of the integrator [s].
-        steps: number of steps, settling included.
+        step: step of the integrator where a joint reverses [s].
+        steps: number of steps, settling included, and those that were taken again as shorter ones.
         warnings: what a user should know.
     """
 

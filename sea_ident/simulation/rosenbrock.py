@@ -17,6 +17,7 @@ class RosenbrockW:
         stage: (s, s) coefficients of the stage values.
         coupling: (s, s) coefficients of the right-hand sides.
         weights: (s,) coefficients of the result.
+        error: (s,) coefficients of its difference from a result of one order less.
         drift: (s,) coefficients of the change of the right-hand side with time alone.
         order: order of convergence.
     """
@@ -26,11 +27,14 @@ class RosenbrockW:
     stage: FloatArray
     coupling: FloatArray
     weights: FloatArray
+    error: FloatArray
     drift: FloatArray
     order: int
 
     @staticmethod
-    def from_tableau(alpha: FloatArray, gamma: FloatArray, weights: FloatArray, order: int) -> "RosenbrockW":
+    def from_tableau(
+        alpha: FloatArray, gamma: FloatArray, weights: FloatArray, embedded: FloatArray, order: int
+    ) -> "RosenbrockW":
         """Coefficients in the form without products with the Jacobian (Hairer, Wanner II, section IV.7)."""
         inverse = np.linalg.inv(gamma)
         diagonal = float(gamma[0, 0])
@@ -40,6 +44,7 @@ class RosenbrockW:
             alpha @ inverse,
             np.eye(len(weights)) / diagonal - inverse,
             weights @ inverse,
+            (weights - embedded) @ inverse,
             gamma.sum(axis=1),
             order,
         )
@@ -57,4 +62,5 @@ def ros34pw2() -> RosenbrockW:
     gamma[2, :2] = [-9.0338057013044082e-01, 5.4180672388095326e-02]
     gamma[3, :3] = [2.4212380706095346e-01, -1.2232505839045147e00, 5.4526025533510214e-01]
     weights = np.array([2.4212380706095346e-01, -1.2232505839045147e00, 1.5452602553351020e00, g])
-    return RosenbrockW.from_tableau(alpha, gamma, weights, 3)
+    embedded = np.array([3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.1793326075422950e-01])
+    return RosenbrockW.from_tableau(alpha, gamma, weights, embedded, 3)

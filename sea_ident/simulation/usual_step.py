@@ -16,6 +16,9 @@ LONGEST = 2.5e-3
 SHORTEST = 5e-4
 """... and where it asks for next to nothing [s]: friction without any smoothing has no step that is short enough."""
 
+LONGEST_BETWEEN = 5e-3
+"""Step between reversals [s], where it is seen to be short enough."""
+
 TIMES_BRAKING = 3.0
 """Times as long as the time in which friction at its steepest brakes a joint that a step may be [-].
 

@@ -8,15 +8,18 @@ from plants import baxter_arm, from_parts, joint, link, modest_series, motor, ur
 
 from sea_ident import FourierSeries
 from sea_ident.simulation import (
+    ComputedTorque,
     FrictionJitter,
     PreslidingCoulomb,
     SensorNoise,
+    Settling,
     SmoothCoulomb,
+    VelocityController,
     plant_from_robot,
     simulate,
 )
 from sea_ident.simulation.reference import PeriodicReference
-from sea_ident.simulation.usual_step import LONGEST, SHORTEST, usual_step
+from sea_ident.simulation.usual_step import LONGEST, LONGEST_BETWEEN, SHORTEST, usual_step
 
 FRICTION = np.array([6.7, 8.0, 6.4, 0.0, 0.0, 0.0])
 """Coulomb friction of a rigid arm of which the inertia of the rotors is not known, wrist apart [N m]."""
@@ -114,3 +117,62 @@ def test_a_fast_arm_without_friction_keeps_to_its_own_equations_of_motion():
     assert np.abs(usual.motion.dq).max() > 3.0
     assert np.abs(usual.motion.q - exact.motion.q).max() < 3e-6
     assert np.abs(usual.tau_motor - exact.tau_motor).max() < 0.03
+
+
+@pytest.mark.parametrize("which", ["leg", "baxter", "rigid arm", "stiction"])
+def test_long_steps_between_reversals_leave_the_motion_where_short_ones_put_it(which, leg, leg_series, arm):
+    robot, plant, series = arm
+    law = SmoothCoulomb(0.009)
+    if which in ("leg", "stiction"):
+        robot, plant, series = leg, plant_from_robot(leg), leg_series
+        law = PreslidingCoulomb() if which == "stiction" else SmoothCoulomb()
+    elif which == "baxter":
+        robot = baxter_arm()
+        plant, series, law = (
+            plant_from_robot(robot),
+            modest_series(robot, base_frequency=0.2, harmonics=3),
+            SmoothCoulomb(),
+        )
+
+    def run(step):
+        quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none(), "start": begin}
+        return simulate(robot, series, periods=1, plant=plant, step=step, friction=law, **quiet)
+
+    def errors(run):
+        torque = np.abs(run.tau_motor - exact.tau_motor).max(axis=0) / np.abs(exact.tau_motor).max(axis=0)
+        return np.abs(run.motion.q - exact.motion.q).max(), torque.max()
+
+    begin = simulate(robot, series, periods=1, plant=plant, friction=law, settling=Settling(1e-4)).motion
+    usual = run(None)
+    short, exact = run(usual.step), run(usual.step / 4.0)
+    assert usual.steps < 0.9 * short.steps
+    assert np.all(np.array(errors(usual)) < np.maximum([1e-5, 2e-3], 1.5 * np.array(errors(short))))
+
+
+def test_where_every_long_step_is_too_long_few_are_tried(leg):
+    series = FourierSeries(2.0, np.zeros(3), np.full((3, 2), 0.05), np.full((3, 2), 0.1))
+    usual = simulate(leg, series, periods=1)
+    short = simulate(leg, series, periods=1, step=usual.step)
+    assert short.settling_periods == usual.settling_periods
+    assert usual.steps < 1.2 * short.steps
+
+
+def test_no_long_step_goes_across_a_reversal(leg, leg_series):
+    quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none(), "start": leg_series.motion(np.zeros(1))}
+    usual = simulate(leg, leg_series, periods=1, **quiet)
+    speeds = np.concatenate([usual.motion.dq, usual.motion.dtheta], axis=1)
+    reversed_in = np.any(speeds[1:] * speeds[:-1] < 0.0, axis=1)
+    assert np.sum(reversed_in) > 20
+    assert usual.steps >= round(usual.period / LONGEST_BETWEEN) + round(LONGEST_BETWEEN / usual.step) * np.sum(
+        reversed_in
+    )
+    given = simulate(leg, leg_series, periods=1, step=usual.step, **quiet)
+    assert given.steps == round(given.period / given.step)
+
+
+def test_gains_do_not_change_with_the_steps(leg, leg_series):
+    reference = PeriodicReference(leg_series)
+    for controller in (VelocityController(), ComputedTorque()):
+        one, other = (controller.drive(leg, reference, np.linspace(0.0, end, 7)) for end in (1.0, 3.0))
+        np.testing.assert_array_equal(one.velocity_gain, other.velocity_gain)
+        np.testing.assert_array_equal(one.position_gain, other.position_gain)
