@@ -79,14 +79,15 @@ class HeldOut:
         """What one effect of another selection is worth on the same data, by its position in the model.
 
         Whatever other selections were tried before it, or are at the same time. What is far behind another effect
-        (`beside`) is not fitted anew.
+        (`beside`) is not fitted anew. All are compared in the noise floor of this selection: floors of two models
+        differ by some percent, and the statistics of models that do the same would as well.
         """
         if beside is not None:
             behind = far_behind(self.bench, selection, self.now, position, beside)
             if behind is not None:
                 return behind
         bench = self.bench.apart()
-        _, now = _fitted_anew(bench, selection)
+        _, now = _fitted_anew(bench, selection, self.now.noise)
         (found,) = transfer(bench, selection, now, [position])
         return found
 
@@ -177,10 +178,10 @@ def tried(other: Bench, selection: Selection, source: str) -> HeldOut:
     return HeldOut(other, before, after, other.noise(after), now, transfers, source)
 
 
-def _fitted_anew(other: Bench, selection: Selection) -> tuple[Fit, Settled]:
+def _fitted_anew(other: Bench, selection: Selection, noise: NoiseFloor | None = None) -> tuple[Fit, Settled]:
     """What was found on data that it was not fitted to: with its parameters as they are, and fitted to them."""
     after = _as_found(other, selection.final.fit, selection)
-    return after, settle_again(other, after)
+    return after, settle_again(other, after, noise)
 
 
 def _as_found(other: Bench, fit: Fit, selection: Selection) -> Fit:

@@ -66,9 +66,9 @@ def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
     return settled
 
 
-def settle_again(bench: Bench, fit: Fit) -> Settled:
-    """Noise floor of a fit, and the fit refined in it."""
-    noise = bench.noise(fit)
+def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Settled:
+    """Noise floor of a fit, or a given one, and the fit refined in it."""
+    noise = bench.noise(fit) if noise is None else noise
     anchored = bench.anchored(fit.effects, fit.parameters)
     bench.release(anchored)
 

@@ -64,6 +64,18 @@ def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
     assert (name, left) == ("spring_offset", [])
 
 
+def test_what_does_the_same_on_the_other_motion_is_worth_the_same(rivals):
+    """Friction of a spring that only holds it aside is an offset: each in its own noise floor, they seem 20 apart."""
+    _, other, start, fits = rivals
+    chosen = {name: Selection(start, Settled(fit, start.noise), 1, (1e-9,)) for name, fit in fits.items()}
+    position = len(start.fit.effects)
+    for own, rival in (("spring_offset", "spring_hysteresis"), ("spring_hysteresis", "spring_offset")):
+        held = tried(other, chosen[own], "another motion")
+        worth = held.worth(chosen[rival], position)
+        assert abs(worth.statistic - held.transfers[0].statistic) < 10.0
+        assert held.worth(chosen[own], position).statistic == pytest.approx(held.transfers[0].statistic, abs=1e-6)
+
+
 def test_what_takes_more_parameters_is_taken_where_the_other_motion_asks_for_it_only(rivals):
     assert decided(rivals, "spring_hysteresis", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
     assert decided(rivals, "spring_offset", "spring_offset", dearer=True)[:2] == ("spring_offset", [])

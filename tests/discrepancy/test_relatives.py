@@ -43,10 +43,14 @@ def found(bench: Bench, *effects: Effect) -> Selection:
 
 
 @pytest.fixture(scope="module")
-def ripple_found(nothing_missing):
-    """A ripple at the hip that grows with the deflection, found as a ripple, and what that is held against."""
-    bench, motion = nothing_missing[0], nothing_missing[0].data.motion
-    torque = 21.0 * motion.deflection[:, HIP] * np.sin(12.0 * motion.theta[:, HIP])
+def ripple_found(laboratory):
+    """A ripple at the hip that grows with the deflection, found as a ripple, and what that is held against.
+
+    What the ripple leaves is far from noise, by 16 periods, and less than a hundredth of the torque.
+    """
+    bench = laboratory.bench(laboratory.record(periods=16))
+    motion = bench.data.motion
+    torque = 18.0 * motion.deflection[:, HIP] * np.sin(12.0 * motion.theta[:, HIP])
     bench = with_torque(bench, (HIP, torque))
     selection = found(bench, make_effect("torque_ripple", "hip", order=12.5))
     return bench, selection, *unnamed(bench, selection, None)
@@ -61,7 +65,7 @@ def test_a_ripple_that_grows_with_the_load_is_not_a_ripple(ripple_found):
     relative = fit.effects[-1]
     assert relative.order == pytest.approx(12.0, abs=0.5)
     amplitude = np.hypot(*(fit.parameters[c.name] for c in relative.columns(bench.robot)))
-    assert amplitude * bench.robot.spring("hip").stiffness == pytest.approx(21.0, rel=0.1)
+    assert amplitude * bench.robot.spring("hip").stiffness == pytest.approx(18.0, rel=0.1)
 
 
 def with_ripple(bench: Bench, growth: float, constant: float) -> Bench:
@@ -150,7 +154,9 @@ def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
     bench = with_torque(bench, (KNEE, 0.15 * friction.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0]))
     both = [make_effect(name, "knee") for name in ("torque_constant", "directional_efficiency")]
     selection = found(bench, *both)
-    assert [selection.final.fit.parameters[f"knee.{e.name}"] for e in both] == pytest.approx([-0.15, 0.3], rel=0.1)
+    # they turn over at a reversal as the friction does not: the constant is a tenth off, whatever the noise
+    found_values = [selection.final.fit.parameters[f"knee.{e.name}"] for e in both]
+    assert found_values == pytest.approx([-0.137, 0.285], rel=0.05)
     (one,) = unnamed(bench, selection, None)
     assert one.relative == "torque_constant the other way round where the motor is driven"
     fit = bench.again(one.solution, selection.final.noise)
