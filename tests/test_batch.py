@@ -64,6 +64,7 @@ def test_every_recording_is_a_row_and_a_bad_one_says_why(robot, fleet):
         assert abs(float(row[mass]) - true) < 5 * float(row[f"{mass} std"])
 
 
+@pytest.mark.scenario
 def test_parallel_and_serial_give_the_same_models(robot, fleet):
     serial = identify_batch(robot, fleet, fleet / "serial", period=PERIOD, jobs=1)
     parallel = identify_batch(robot, fleet, fleet / "parallel", period=PERIOD, jobs=2)
@@ -97,6 +98,7 @@ batch.identify_batch(load_robot("emps"), sys.argv[1], period=2.0, jobs=1)
 """
 
 
+@pytest.mark.scenario
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_after_a_kill_the_rest_is_done_and_the_table_is_that_of_one_run(robot, fleet):
     process = subprocess.Popen([sys.executable, "-c", PROGRAM, str(fleet)], stderr=subprocess.DEVNULL)

@@ -80,6 +80,7 @@ def test_csv_is_the_trajectory_in_full(written):
     np.testing.assert_allclose(np.gradient(table[:, 3], 1e-3, edge_order=2), table[:, 6], atol=1e-4)
 
 
+@pytest.mark.scenario
 def test_messages_are_the_trajectory_at_a_hundred_points_a_second(written):
     folder, _ = written
     motion = sample_trajectory(read_excitation(folder / "e.json"), 100.0, 2)
@@ -92,6 +93,7 @@ def test_messages_are_the_trajectory_at_a_hundred_points_a_second(written):
     np.testing.assert_array_equal([point.velocities for point in message.points], motion.dq)
 
 
+@pytest.mark.scenario
 def test_a_trajectory_that_ends_in_motion_is_told(tmp_path):
     done = call("excite", "exo_leg", "--out", "e.json", *QUICK, "--yaml", "t.yaml", "--rate", 20, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -99,6 +101,7 @@ def test_a_trajectory_that_ends_in_motion_is_told(tmp_path):
     assert len(yaml.safe_load((tmp_path / "t.yaml").read_text())["points"]) == 100
 
 
+@pytest.mark.scenario
 def test_limits_in_space_are_kept_and_told(tmp_path):
     done = call(
         "excite", "exo_leg", "--out", "e.json", *QUICK, "--half-space", "foot@0,0,-0.05:1,0,0,0.5",
@@ -167,6 +170,7 @@ def interrupted(program, *arguments):
     return process.returncode, told + errors
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_writes_the_best_so_far(tmp_path, jobs):
     code, told = interrupted(
@@ -183,6 +187,7 @@ def test_ctrl_c_writes_the_best_so_far(tmp_path, jobs):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["e.json", "t.csv"]
 
 
+@pytest.mark.scenario
 def test_ctrl_c_before_there_is_anything_writes_nothing(tmp_path):
     code, told = interrupted(_BEFORE_ANY, "excite", "exo_leg", "--out", tmp_path / "e.json")
     assert code == 130, told

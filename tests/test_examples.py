@@ -90,6 +90,7 @@ def test_a_script_asks_for_nothing_that_only_a_notebook_has(script: Path) -> Non
     assert not names & {"display", "get_ipython", "In", "Out"}
 
 
+@pytest.mark.scenario
 def test_real_data_says_what_is_absent(tmp_path: Path) -> None:
     environment = {**os.environ, "SEA_IDENT_DATA": str(tmp_path), "MPLBACKEND": "Agg"}
     script = EXAMPLES / "real_data.py"

@@ -237,6 +237,7 @@ def test_planted_sizes_leave_the_wanted_gap(effect: str, form: str, joint: int, 
     assert leg.measure(replace(planted, size=1e-9)).gap < 0.01
 
 
+@pytest.mark.scenario
 def test_every_form_has_a_law_and_every_entry_a_place(leg: gap.Gauge) -> None:
     rng, plain = generator(4), sensors.signals(leg.exact, leg.truth, ())
     for entry in (*catalogue.OTHER_FORMS, *catalogue.UNKNOWN, *catalogue.REFERENCE):

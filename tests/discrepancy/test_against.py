@@ -50,6 +50,7 @@ def test_an_effect_that_is_new_changes_nothing_else(changed, new):
     assert not changed([], [new], [new]).changed
 
 
+@pytest.mark.scenario
 def test_an_effect_that_was_there_before_changes_nothing(changed):
     assert not changed([MOTOR], [MOTOR], [MOTOR]).changed
 

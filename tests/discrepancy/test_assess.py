@@ -57,6 +57,7 @@ SAME_TORQUE = [
 ]
 
 
+@pytest.mark.scenario
 def test_what_is_a_little_behind_is_kept_for_another_motion_and_declared_by_none(preloaded, monkeypatch):
     bench, _, selection = preloaded
     first = len(selection.start.fit.effects)
@@ -115,6 +116,7 @@ def test_play_that_a_nearly_straight_spring_never_closes_is_an_offset_and_declar
     assert width * amount == pytest.approx(1.2, rel=0.1)
 
 
+@pytest.mark.scenario
 def test_a_spring_that_stiffens_by_any_power_is_declared_beside_one_with_two_sides(laboratory):
     """Bent to one side only, both give the same torque; held to the square, the one that is there looks worse."""
     planted = [("spring_stiffening", "hip", [-2500.0], {"exponent": 1.9})]

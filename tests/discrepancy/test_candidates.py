@@ -52,6 +52,7 @@ def behind_an_offset(laboratory, offset):
     return bench, bench.fit(model, noise, start=start.parameters), noise
 
 
+@pytest.mark.scenario
 def test_candidates_behind_nearly_the_same_error_of_an_encoder_are_evaluated_once(laboratory, monkeypatch):
     bench, fit, noise = behind_an_offset(laboratory, OFFSETS[0])
     effects = [make_effect("torque_ripple", "knee"), make_effect("parallel_spring", "knee")]

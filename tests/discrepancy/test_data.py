@@ -28,6 +28,7 @@ def sensors(factor):
     )
 
 
+@pytest.mark.scenario
 def test_good_encoders_show_the_corner_of_friction(laboratory):
     """With a tenth of the noise the model is still right: what the regressor cannot follow would stand out by then."""
     recording = laboratory.record(periods=10, sensors=sensors(0.1), jitter=FrictionJitter(0.0, 0.05))

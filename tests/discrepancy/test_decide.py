@@ -123,6 +123,7 @@ def test_what_holds_on_the_other_motion_has_nothing_to_fear_from_it(rivals):
     assert decided(rivals, "spring_offset", "spring_hysteresis", behind=20.0)[:2] == ("spring_offset", [])
 
 
+@pytest.mark.scenario
 def test_the_same_motion_again_decides_between_no_equals(rivals, laboratory, monkeypatch):
     """What one motion does not tell apart its repetition does not either, but by noise."""
     bench, _, start, fits = rivals

@@ -135,6 +135,7 @@ def test_a_period_that_is_none_of_the_motion_is_said_and_written(leg, intact, tm
     assert 0.0 <= written["lack_of_fit"]["p_value"] <= 1.0
 
 
+@pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_nothing_is_concluded_where_joints_changed_places(intact, intact_model):
     """Neither of a recording nor on one that was held out: it is said which columns to exchange."""

@@ -141,6 +141,7 @@ def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripp
     assert found.worth(right, position, own).holds
 
 
+@pytest.mark.scenario
 def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
     """Whatever sensors and friction made of it, and wherever in it the recording begins."""
     again = laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, seed=9)
@@ -164,6 +165,7 @@ def test_an_effect_that_is_not_there_does_not_hold(laboratory, ripple):
     assert transfer.share < 0.1 or not transfer.tested
 
 
+@pytest.mark.scenario
 def test_an_effect_of_the_opposite_sign_does_not_hold(laboratory, ripple):
     turned = laboratory.record([("torque_ripple", "hip", [-1.0, -0.5], {"order": 4.0})], periods=5, motion=1, seed=8)
     (transfer,) = held_out(*ripple, turned)[0].transfers

@@ -61,6 +61,7 @@ def test_an_ambiguous_pair_is_settled_by_the_proposed_motion(leg, series, name, 
     assert [(m.effect, m.joint) for m in found.missing] == [(name, joint)]
 
 
+@pytest.mark.scenario
 def test_a_stiffness_below_zero_predicts_no_deflection():
     leg = sea_ident.load_robot("exo_leg")
     series = sea_ident.design_excitation(leg, base_frequency=0.2, harmonics=5, starts=1, seed=0).series

@@ -60,6 +60,7 @@ def test_a_fit_comes_again_from_what_it_came_to(rippled):
             np.testing.assert_array_equal(getattr(again, name), getattr(fit, name), err_msg=name)
 
 
+@pytest.mark.scenario
 def test_a_shape_is_refined_beside_what_is_known(laboratory):
     """With the other ripple known it ends where it does with that in the model."""
     planted = [("torque_ripple", joint, [1.0, 0.5], {"order": 4.0}) for joint in ("hip", "knee")]

@@ -229,6 +229,7 @@ def test_two_frictions_that_are_there_have_their_amounts(laboratory):
     assert [bends_another(bench, fit, k) for k in (-2, -1)] == [False, False]
 
 
+@pytest.mark.scenario
 def test_a_small_part_of_the_wrong_sign_is_excused_while_others_are_missing(laboratory):
     """By what holding it at zero would cost, as a share of what the whole effect explains."""
     bench = laboratory.bench(laboratory.record([("link_friction", "knee", [0.0, 0.2], {})], periods=5))

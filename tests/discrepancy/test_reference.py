@@ -103,6 +103,7 @@ def test_two_changes_are_told_apart_each_with_its_own_torque(laboratory, recorde
     assert friction.torque_share != by_name["payload", "ankle"].torque_share
 
 
+@pytest.mark.scenario
 def test_all_torque_constants_have_the_share_of_torque_that_they_changed_by(recorded, compared):
     recording = recorded()
     columns = {name: 1.03 * v if name.startswith("current_") else v for name, v in recording.columns.items()}
@@ -113,6 +114,7 @@ def test_all_torque_constants_have_the_share_of_torque_that_they_changed_by(reco
     assert found.missing[0].torque_share == pytest.approx(0.03, rel=0.05)
 
 
+@pytest.mark.scenario
 def test_what_others_explain_as_well_is_not_listed_beside_them(recorded, compared):
     """A torque constant that both models lack looks like all of them, until what it does is found piece by piece."""
     found = compared(recorded([("torque_constant", "hip", [-0.03], {})]), recorded(seed=11))

@@ -75,6 +75,7 @@ def test_what_has_no_noise_hides_no_copy(name, values):
         not_the_same(first, changed(first, lambda x: np.round(x, 5)))
 
 
+@pytest.mark.scenario
 def test_the_same_periods_processed_by_a_caller_are_refused(laboratory):
     first, same, other = (
         wide_processing(laboratory.record(periods=3, seed=seed), laboratory.leg, 5.0) for seed in (3, 3, 4)

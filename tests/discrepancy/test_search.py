@@ -34,6 +34,7 @@ def unequal(laboratory):
     return bench, search(bench, bench.effects)
 
 
+@pytest.mark.scenario
 def test_two_processes_find_what_one_does(unequal, monkeypatch):
     """To the last digit."""
     bench, alone = unequal
@@ -53,6 +54,7 @@ def test_two_processes_find_what_one_does(unequal, monkeypatch):
     assert [(c.key, c.gain) for c in both.candidates] == [(c.key, c.gain) for c in alone.candidates]
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("far", "tried"), [(np.inf, [1, 2]), (0.0, [2])])
 def test_far_from_right_nothing_gives_way_before_all_is_added(unequal, monkeypatch, far, tried):
     """But then it does: what was added first may be the wrong one."""
@@ -95,6 +97,7 @@ def test_what_was_found_stands_still(unequal):
     assert again.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
 
 
+@pytest.mark.scenario
 def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
     """What takes the place of another may come with shapes that are not yet right beside the rest."""
     bench, found = unequal
@@ -167,6 +170,7 @@ def test_the_longest_wave_costs_more_than_a_constant(nothing_missing):
     assert penalty(make_effect("torque_offset", "hip"), bench) < penalty(shorter, bench)
 
 
+@pytest.mark.scenario
 def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_left(nothing_missing):
     """Less than what counts as the form of the ripple, but a ripple in the wrong form would leave something."""
     data = nothing_missing[0].data
@@ -185,6 +189,7 @@ def test_a_small_effect_beside_a_large_one_counts_where_it_explains_all_that_is_
     assert sizes["position_dependent_friction"] < BESIDE_ANOTHER * sizes["torque_ripple"]
 
 
+@pytest.mark.scenario
 def test_another_power_of_the_deflection_beside_the_cubic_stiffness(laboratory):
     """The model has the cubic stiffness; a spring that stiffens with the square is no asymmetric one for that."""
     planted = [("spring_stiffening", "knee", [3000.0], {"exponent": 2.0})]
@@ -297,6 +302,7 @@ class Thinning(NonlinearViscousFriction):
         return (dtheta / (1.0 + np.abs(dtheta) / self.speed))[:, None]
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("joint", "size", "speed"), [("ankle", 15.0, 1.0), ("hip", 150.0, 0.3), ("knee", 30.0, 1.0)])
 def test_friction_that_thins_with_speed_is_nonlinear_viscous(laboratory, joint, size, speed):
     """Power and viscous friction cancel in large part: what they come to brakes at any speed."""

@@ -50,6 +50,7 @@ def quietly(*arguments, **options):
         return sea_ident.diagnose(*arguments, **options)
 
 
+@pytest.mark.scenario
 def test_none(model, intact, monkeypatch):
     found = quietly(model, intact)
     assert found.verdict is Verdict.NONE

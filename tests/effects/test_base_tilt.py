@@ -123,6 +123,7 @@ def test_a_tilt_is_found_whatever_the_description_says_of_what_is_not_felt_level
     assert all(gap.shrink > 0.8 for gap in found.simulation_gap.values())
 
 
+@pytest.mark.scenario
 def test_where_only_the_product_of_a_tilt_and_a_first_moment_is_felt_that_is_said():
     found, parameters = diagnosed(1, 0.2)
     assert list(parameters) == ["first", "second"]

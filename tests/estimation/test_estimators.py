@@ -64,6 +64,7 @@ def test_spikes_do_not_spoil_the_robust_estimate(leg, coarse):
     assert np.median(plain.std / clean.std) > 4.0
 
 
+@pytest.mark.scenario
 def test_noise_in_the_regressor_biases_least_squares_but_not_instruments_nor_likelihood(leg, coarse):
     plain, instruments, simulated = (
         JointWLS(),

@@ -51,6 +51,7 @@ def scores(pieces):
     return np.array(out)
 
 
+@pytest.mark.scenario
 def test_four_periods_are_off_by_no_more_than_they_say(pieces, monkeypatch):
     found = scores(pieces)
     # of six recordings of one motion the mean is known to 0.4: what is left of the bias is three times that

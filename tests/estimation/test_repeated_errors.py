@@ -45,6 +45,7 @@ def test_steps_are_found_in_counts_and_not_in_noise():
     assert step_of(np.zeros(10)) == 0.0
 
 
+@pytest.mark.scenario
 def test_steps_that_repeat_are_told_and_counted(leg, truth):
     outside = []
     for seed in range(3):
@@ -63,6 +64,7 @@ def test_steps_that_repeat_are_told_and_counted(leg, truth):
     assert sum(outside) <= 2
 
 
+@pytest.mark.scenario
 def test_what_steps_change_is_seen_in_a_few_periods(leg, truth, monkeypatch):
     """The same errors in all periods change the estimate by the same."""
     processed = process(rounded(leg, truth, 0, STEP), leg, period=10.0)

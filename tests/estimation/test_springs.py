@@ -75,6 +75,7 @@ def test_one_shot_gives_the_same_from_exact_data(leg, truth):
     np.testing.assert_allclose(found(model)[0], planted(leg), rtol=1e-4)
 
 
+@pytest.mark.scenario
 def test_one_shot_is_sharper_and_as_honest(leg, coarse):
     z, gain = [], []
     for seed in range(5):

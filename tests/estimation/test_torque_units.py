@@ -65,6 +65,7 @@ def test_thousandths_and_a_torque_before_the_gear_are_recognised(recorded):
     assert f"gear_ratio={ratio:g}" in text
 
 
+@pytest.mark.scenario
 def test_nothing_is_concluded_from_such_a_recording(recorded):
     _, model, recording = recorded
     with warnings.catch_warnings():

@@ -72,6 +72,7 @@ def test_a_gain_that_drifts_from_period_to_period_is_inside_the_intervals_of_few
     assert np.mean(inside) > 0.88
 
 
+@pytest.mark.scenario
 def test_nothing_drifts(leg, coarse):
     told = [
         any("whole periods differ" in text for text in identify(leg, drifting(leg, coarse, seed, 0.0)).warnings)
@@ -80,6 +81,7 @@ def test_nothing_drifts(leg, coarse):
     assert np.mean(told) < 0.3
 
 
+@pytest.mark.scenario
 def test_stated_deviations_match_the_scatter_between_repeats(leg, coarse):
     models = [
         identify(leg, record(leg, coarse, 10, seed=seed, torque_noise=0.2, reversal_noise=0.5), period=10.0)

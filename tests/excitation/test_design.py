@@ -105,6 +105,7 @@ def test_far_better_than_random_starts(exo, designed):
     assert designed.log_det > best + 3.0
 
 
+@pytest.mark.scenario
 def test_same_seed_same_result_whatever_the_jobs(exo):
     first = design_excitation(exo, seed=5, jobs=1, **THOROUGH)
     again = design_excitation(exo, seed=5, jobs=2, **THOROUGH)
@@ -155,6 +156,7 @@ def test_every_criterion_is_best_in_its_own_sense(exo):
     np.testing.assert_array_equal(np.argmax(mean, axis=1), np.arange(4))
 
 
+@pytest.mark.scenario
 def test_what_is_raised_is_told_and_an_interrupted_design_is_of_its_criterion(exo, plain):
     """Every design begins with log det; what it then reports is its own criterion, however early it was stopped."""
     told: list[str] = []
@@ -292,6 +294,7 @@ def test_spring_columns_gain_from_a_design_that_includes_them(exo, plain):
     assert spring_information(with_springs) > spring_information(plain) + 0.1
 
 
+@pytest.mark.scenario
 def test_discrimination_raises_what_tells_two_effects_apart(exo, plain):
     target, other = make_effect("stribeck_friction", "knee"), make_effect("nonlinear_viscous_friction", "knee")
     criterion = Discrimination(target, (other,))

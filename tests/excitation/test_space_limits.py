@@ -397,6 +397,7 @@ def test_limits_that_cannot_be_used(changes, says):
         design(arm(), **changes)
 
 
+@pytest.mark.scenario
 def test_what_nobody_can_keep_is_said_with_plane_and_numbers():
     with pytest.raises(InfeasibleError, match=r"floor \(hand\): n . p = .* m with n = \[0.0, 0.0, 1.0\], at most -3 m"):
         design(arm(), half_spaces=(half_space(normal=(0.0, 0.0, 1.0), offset=-3.0),))

@@ -7,7 +7,7 @@ from scipy.integrate import simpson, solve_ivp
 from sea_ident import Motion, build_regressor, load_robot
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.regressor import inverse_dynamics
-from sea_ident.simulation import PreslidingCoulomb, SmoothCoulomb, VelocityController, simulate
+from sea_ident.simulation import PreslidingCoulomb, Settling, SmoothCoulomb, VelocityController, simulate
 
 
 def full_model(robot):
@@ -174,6 +174,6 @@ def test_stiff_friction_and_light_links_stay_stable_at_the_default_step(quiet):
     robot = baxter_arm()
     simulation = simulate(
         robot, modest_series(robot), periods=1, **{**quiet, "friction": SmoothCoulomb(1e-3)},
-        controller=VelocityController(bandwidth=150.0, correction=30.0),
+        controller=VelocityController(bandwidth=150.0, correction=30.0), settling=Settling(longest=2),
     )  # fmt: skip
     assert np.abs(simulation.motion.theta - simulation.reference.theta).max() < 0.02

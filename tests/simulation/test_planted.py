@@ -132,6 +132,7 @@ class Gust(JointEffect):
         return act
 
 
+@pytest.mark.scenario
 def test_effects_of_others_see_the_time_of_the_recording(leg, leg_series, quiet):
     run = simulate(leg, leg_series, periods=1, effects=[PlantedEffect(Gust("hip"), np.array([3.0]))], **quiet)
     own = (*base_effects(leg), *spring_effects(leg))

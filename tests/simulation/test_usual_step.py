@@ -36,6 +36,7 @@ def steps(robot, plant, law, series):
     return usual_step(plant, [law] * robot.n, PeriodicReference(series))
 
 
+@pytest.mark.scenario
 def test_a_light_joint_with_much_friction_is_not_thrown_back_where_it_reverses(arm):
     robot, plant, series = arm
     begin = series.motion(np.zeros(1))
@@ -54,6 +55,7 @@ def test_a_light_joint_with_much_friction_is_not_thrown_back_where_it_reverses(a
     assert long_error > 3.0 * usual_error
 
 
+@pytest.mark.scenario
 def test_a_light_rotor_that_reverses_quickly_is_where_short_steps_put_it():
     numbers = "<viscousFriction>0.4</viscousFriction><coulombFriction>1.0</coulombFriction>"
     robot = from_parts(
@@ -100,6 +102,7 @@ def test_a_step_that_is_given_is_taken(arm):
     assert simulate(robot, series, periods=1, plant=plant, step=5e-3).step == pytest.approx(5e-3)
 
 
+@pytest.mark.scenario
 def test_a_fast_arm_without_friction_keeps_to_its_own_equations_of_motion():
     """Stiff gains on light wrists: a step that knew the state but not the command was 2e-5 rad and 0.1 N m off."""
     robot = ur10()
@@ -119,6 +122,7 @@ def test_a_fast_arm_without_friction_keeps_to_its_own_equations_of_motion():
     assert np.abs(usual.tau_motor - exact.tau_motor).max() < 0.03
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("which", ["leg", "baxter", "rigid arm", "stiction"])
 def test_long_steps_between_reversals_leave_the_motion_where_short_ones_put_it(which, leg, leg_series, arm):
     robot, plant, series = arm
