@@ -127,7 +127,7 @@ def simulate(
     longest = LONGEST_BETWEEN if step is None else step
     step = usual_step(plant, laws, follow) if step is None else step
     _check_size(follow, rate, step)
-    clocks, method = Clock.short_and_long(follow, rate, step, longest), ros34pw2()
+    clocks, method = Clock.from_short_to_long(follow, rate, step, longest), ros34pw2()
     clock, times = clocks[0], np.concatenate([each.stage_times(method.nodes) for each in clocks])
     drive = (controller or VelocityController()).drive(robot, follow, times)
     state = _initial_state(plant, drive, start)

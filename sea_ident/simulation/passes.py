@@ -23,8 +23,11 @@ SMALL_RATE_ERROR = 5e-5
 """... and of the speeds [rad/s] or [m/s]: what turns over quickly shows there first. Positions of legs and of arms are
 then as near to those of steps of a twentieth as they are with short steps alone, within 1e-5 rad."""
 
+MOST_PARTS = 4
+"""Short steps in a long one up to which there are none between."""
+
 LONGEST_WAIT = 7
-"""Long steps that are not tried at most after as many as that were too long in turn."""
+"""Steps of a length that are not tried at most, after as many in turn that were too long."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +51,14 @@ class Clock:
         return Clock(samples, ceil(reference.duration / samples / step - 1e-9), reference.duration)
 
     @staticmethod
-    def short_and_long(reference: Reference, rate: float, short: float, long: float) -> tuple["Clock", ...]:
-        """The clock of short steps [s], and that of long ones, made of several short ones, where these differ."""
-        longer, shorter = (Clock.build(reference, rate, step) for step in (max(short, long), short))
-        parts = ceil(shorter.substeps / longer.substeps)
-        return (longer,) if parts == 1 else (replace(longer, substeps=parts * longer.substeps), longer)
+    def from_short_to_long(reference: Reference, rate: float, short: float, long: float) -> tuple["Clock", ...]:
+        """Clocks of steps up to `short` [s], perhaps of some between, and up to `long`, each of which is several."""
+        longest, shortest = (Clock.build(reference, rate, step) for step in (max(short, long), short))
+        parts = ceil(shortest.substeps / longest.substeps)
+        between = round(sqrt(parts)) if parts > MOST_PARTS else 1
+        parts = ceil(parts / between)
+        counts = dict.fromkeys((parts * between * longest.substeps, between * longest.substeps, longest.substeps))
+        return tuple(replace(longest, substeps=count) for count in counts)
 
     @property
     def interval(self) -> float:
@@ -83,6 +89,7 @@ class _Track:
 
     def __init__(self, system: ClosedLoop, clock: Clock, bias: FloatArray, later: float) -> None:
         self.step, self.clock = system.steps(clock.step), clock
+        self.waits = self.patience = 0
         self.biases: list[list[list[float]]] = bias.tolist()
         self.rates = np.zeros((len(bias), system.size))
         self.rates[:, system.motor] = (bias[:, 1] - bias[:, 0]) / (later * clock.step)
@@ -93,8 +100,8 @@ class Passes:
 
     Args:
         system: the closed loop.
-        drive: at the stages of all steps of a pass; of the short ones first, then of the long ones.
-        clocks: of the short steps; and of the long ones where there are any, each made of as many short ones.
+        drive: at the stages of all steps of a pass, for one clock after the other.
+        clocks: of the steps from short to long, each made of several of those before.
         nodes: of the method.
         begin: of the recording [s].
     """
@@ -107,17 +114,16 @@ class Passes:
         nodes: FloatArray,
         begin: float,
     ) -> None:
-        bias = drive.bias.reshape(-1, len(nodes), system.n)
-        clock = clocks[0]
-        count = clock.samples * clock.substeps + 1
-        self._system, self._clock, self._begin = system, clock, begin
-        self._short = _Track(system, clock, bias[:count], float(nodes[1]))
-        self._long = _Track(system, clocks[1], bias[count:], float(nodes[1])) if len(clocks) > 1 else None
+        bias, end = drive.bias.reshape(-1, len(nodes), system.n), 0
+        self._system, self._clock, self._begin = system, clocks[0], begin
+        self._tracks: list[_Track] = []  # from long to short
+        for clock in clocks:
+            start, end = end, end + clock.samples * clock.substeps + 1
+            self._tracks.insert(0, _Track(system, clock, bias[start:end], float(nodes[1])))
         self._states: list[FloatArray] = []
         self._accelerations: list[FloatArray] = []
         self._tau_motor: list[list[float]] = []
         self._tau_spring: list[list[float]] = []
-        self._waits = self._patience = 0
         self.steps = 0
 
     def settle(self, state: FloatArray, samples: int | None = None) -> FloatArray:
@@ -134,63 +140,65 @@ class Passes:
         self._keep(self._begin + self._clock.duration, self._clock.samples, state)
 
     def _run(self, state: FloatArray, begin: float, first: int = 0, *, keep: bool) -> FloatArray:
-        interval = self._clock.interval
+        interval, longest = self._clock.interval, self._tracks[0].clock.substeps
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges is told as such
             for sample in range(first, self._clock.samples):
                 if keep:
                     self._keep(begin + sample * interval, sample, state)
-                state = self._sampled(state, begin, sample)
+                for k in range(sample * longest, (sample + 1) * longest):
+                    state = self._advanced(state, begin, k, 0)
                 self._check(state, begin + (sample + 1) * interval)
         return state
 
-    def _sampled(self, state: FloatArray, begin: float, sample: int) -> FloatArray:
-        """The state one sample later: by long steps where these see what happens, else by short ones."""
-        long, substeps = self._long, self._clock.substeps
-        if long is None:
-            return self._stepped(state, begin, range(sample * substeps, (sample + 1) * substeps))
-        parts = substeps // long.clock.substeps
-        for k in range(sample * long.clock.substeps, (sample + 1) * long.clock.substeps):
-            self._waits -= 1
-            after = self._strode(long, state, begin, k) if self._waits < 0 else None
+    def _advanced(self, state: FloatArray, begin: float, k: int, level: int) -> FloatArray:
+        """The state after step k of a length: by this step where it sees what happens, else by those it is made of."""
+        track = self._tracks[level]
+        if level == len(self._tracks) - 1:
+            return self._stepped(track, state, begin, k)
+        track.waits -= 1
+        if track.waits < 0:
+            after = self._strode(track, state, begin, k)
             if after is not None:
-                state, self._patience = after, 0
-                continue
-            if self._waits < 0:  # in vain: where one is too long, the next ones mostly are
-                self._waits = self._patience = min(2 * self._patience + 1, LONGEST_WAIT)
-            state = self._stepped(state, begin, range(k * parts, (k + 1) * parts))
+                track.patience = 0
+                return after
+            # where one is too long, the next ones mostly are
+            track.waits = track.patience = min(2 * track.patience + 1, LONGEST_WAIT)
+        parts = self._tracks[level + 1].clock.substeps // track.clock.substeps
+        for part in range(k * parts, (k + 1) * parts):
+            state = self._advanced(state, begin, part, level + 1)
         return state
 
-    def _strode(self, long: _Track, state: FloatArray, begin: float, k: int) -> FloatArray | None:
-        """The state one long step later; None where a joint reverses meanwhile, or too much may be wrong with it."""
-        system, h = self._system, long.step.length
-        self.steps += 1
+    def _strode(self, track: _Track, state: FloatArray, begin: float, k: int) -> FloatArray | None:
+        """The state one step later; None where a joint reverses meanwhile, or too much may be wrong with it."""
+        size = self._system.size
         try:
-            after = system.step(long.step, begin + k * h, long.biases[k], long.rates[k], state)
+            after = self._step(track, state, begin, k)
         except (SimulationError, OverflowError):
             return None
-        size = system.size
-        error = long.step.error.dot(system.increments)
+        error = track.step.error.dot(self._system.increments)
         small = _norm(error[:size]) < SMALL_ERROR and _norm(error[size:]) < SMALL_RATE_ERROR  # not what is not finite
         if not small or float((state[size:] * after[size:]).min()) < 0.0:
             return None
-        system.accept(begin + (k + 1) * h, after)
+        self._system.accept(begin + (k + 1) * track.step.length, after)
         return after
 
-    def _stepped(self, state: FloatArray, begin: float, numbers: range) -> FloatArray:
-        """The state some short steps later."""
-        system, short, h = self._system, self._short, self._clock.step
-        for k in numbers:
-            try:
-                state = system.step(short.step, begin + k * h, short.biases[k], short.rates[k], state)
-            except (SimulationError, OverflowError) as error:
-                raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
-            system.accept(begin + (k + 1) * h, state)
-        self.steps += len(numbers)
+    def _stepped(self, track: _Track, state: FloatArray, begin: float, k: int) -> FloatArray:
+        """The state one step later, whatever that brings."""
+        h = track.step.length
+        try:
+            state = self._step(track, state, begin, k)
+        except (SimulationError, OverflowError) as error:
+            raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
+        self._system.accept(begin + (k + 1) * h, state)
         return state
+
+    def _step(self, track: _Track, state: FloatArray, begin: float, k: int) -> FloatArray:
+        self.steps += 1
+        return self._system.step(track.step, begin + k * track.step.length, track.biases[k], track.rates[k], state)
 
     def _keep(self, time: float, sample: int, state: FloatArray) -> None:
         system = self._system
-        system.evaluate(time, self._short.biases[sample * self._clock.substeps][0], state)
+        system.evaluate(time, self._tracks[-1].biases[sample * self._clock.substeps][0], state)
         self._states.append(state)
         self._accelerations.append(system.acceleration)
         self._tau_motor.append(list(system.tau_motor))

@@ -18,6 +18,7 @@ from sea_ident.simulation import (
     plant_from_robot,
     simulate,
 )
+from sea_ident.simulation.passes import Clock
 from sea_ident.simulation.reference import PeriodicReference
 from sea_ident.simulation.usual_step import LONGEST, LONGEST_BETWEEN, SHORTEST, usual_step
 
@@ -151,6 +152,19 @@ def test_long_steps_between_reversals_leave_the_motion_where_short_ones_put_it(w
     short, exact = run(usual.step), run(usual.step / 4.0)
     assert usual.steps < 0.9 * short.steps
     assert np.all(np.array(errors(usual)) < np.maximum([1e-5, 2e-3], 1.5 * np.array(errors(short))))
+
+
+def test_steps_are_made_of_shorter_ones():
+    reference = PeriodicReference(FourierSeries(0.5, np.zeros(1), np.ones((1, 1)), np.ones((1, 1))))
+
+    def steps(rate, short):
+        return [clock.step for clock in Clock.from_short_to_long(reference, rate, short, LONGEST_BETWEEN)]
+
+    assert steps(200.0, 2.5e-3) == pytest.approx([2.5e-3, 5e-3])
+    assert steps(200.0, 5e-4) == pytest.approx([5e-3 / 12, 5e-3 / 3, 5e-3])
+    assert steps(50.0, 2.5e-3) == pytest.approx([2.5e-3, 5e-3])
+    assert steps(1000.0, 2.5e-3) == pytest.approx([1e-3])
+    assert steps(1000.0, 5e-4) == pytest.approx([5e-4, 1e-3])
 
 
 def test_where_every_long_step_is_too_long_few_are_tried(leg):
