@@ -222,7 +222,7 @@ def test_of_two_waves_of_nearly_the_same_length_none_is_its_own(laboratory, orde
 @pytest.mark.scenario
 def test_two_frictions_that_are_there_have_their_amounts(laboratory):
     laws = [("stribeck_friction", "knee", [5.0], {"speed": 0.1}), ("nonlinear_viscous_friction", "knee", [9.0], {})]
-    bench = laboratory.bench(laboratory.record(laws, periods=10))
+    bench = laboratory.bench(laboratory.record(laws, periods=24))
     effects = [make_effect(name, joint, **shape) for name, joint, _, shape in laws]
     start = settle(bench, bench.effects)
     fit = bench.refine((*start.fit.effects, *effects), start.noise, start=start.fit.parameters, only=len(bench.effects))

@@ -41,7 +41,7 @@ def softening(laboratory):
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize(("drift", "seen", "named"), [(0.15, 1e-3, []), (0.25, 1e-4, ["friction_drift"])])
+@pytest.mark.parametrize(("drift", "seen", "named"), [(0.14, 1e-3, []), (0.25, 1e-4, ["friction_drift"])])
 def test_a_trend_that_one_recording_in_a_thousand_shows_by_chance_has_no_name(laboratory, drift, seen, named):
     found = compared(laboratory.bench(laboratory.record([("friction_drift", "knee", [0.0, drift], {})], periods=12)))
     assert 0.0 < found.p_value < seen
