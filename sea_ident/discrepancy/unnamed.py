@@ -14,8 +14,9 @@ found in an encoder, or as a wave or a spring along the path, against an encoder
 Two effects of one joint may be one that acts in one direction only: a loss that a gear has while its motor drives is
 half a friction that grows with the load and half a torque constant. And friction that grows with the load is twice that
 loss less a torque constant, which is one whose sign turns with the direction. Where one that does all that both do fits
-as well alone, with a parameter less, the two are not what is there. An encoder that errs at a joint and a torque of its
-motor that changes along the path are together a torque on the link: the same effect there is asked too.
+as well alone, with fewer parameters, the two are not what is there. Two waves of nearly one length are one that grows
+and fades, mostly with the load: that one is tried in the place of both. An encoder that errs at a joint and a torque of
+its motor that changes along the path are together a torque on the link: the same effect there is asked too.
 """
 
 from dataclasses import dataclass, replace
@@ -62,6 +63,8 @@ TRIED_FOR_TWO = 4
 ALL_OF_IT = 0.9
 """Share of what two effects explain that one in the place of both must promise before it is fitted [-]."""
 
+_GROWING = "growing with"
+
 
 @dataclass(frozen=True)
 class Unnamed:
@@ -89,7 +92,7 @@ class Unnamed:
         if self.second is not None:
             return (
                 f"{self.effect} and {self.second} at {self.joint} are what one effect alone does as well: "
-                f"{self.relative}, with a parameter less."
+                f"{self.relative}, with fewer parameters."
             )
         same = f"The same as {self.effect} at {self.joint}, but {self.relative},"
         if self.share > LEAVES:
@@ -141,6 +144,11 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
         family: tuple[Effect, ...] = (*behind_the_spring(bench, own), *behind_the_spring(bench, second))
         if own.side is second.side:
             family = (*one_sided(own), *one_sided(second), *family)
+        if type(own) is type(second):  # two waves that beat are one that grows and fades
+            family = (
+                *(relative for each in (own, second) for relative in relatives_of(bench, fit.effects, each)),
+                *family,
+            )
         if not family:
             continue
         others = [e for k, e in enumerate(fit.effects) if k not in (one, two)]
@@ -158,7 +166,9 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
             if new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
                 other = second.title.removesuffix(f" at {second.joint}")
-                found.append(Unnamed(own.name, own.joint, _in_words(candidate.effect), share, new.solution, other))
+                words = _in_words(candidate.effect)
+                words = f"{own.name} {words}" if words.startswith(_GROWING) else words
+                found.append(Unnamed(own.name, own.joint, words, share, new.solution, other))
                 break
     return tuple(found)
 
@@ -240,6 +250,6 @@ def _in_words(relative: Effect) -> str:
     if isinstance(relative, Relative) and relative.only is not None:
         return f"{relative.name} {relative.only}"
     if isinstance(relative, Relative) and relative.growth is not None:
-        return f"growing with the {relative.growth}"
+        return f"{_GROWING} the {relative.growth}"
     driver = relative.driver if isinstance(relative, Relative) else None
     return f"driven by {driver.joint if driver is not None else 'another joint'}"

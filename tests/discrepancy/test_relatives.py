@@ -104,6 +104,24 @@ def test_it_is_said_in_the_verdict_and_in_words(ripple_found):
     assert "The same as torque_ripple at hip, but growing with the load, leaves" in said[1].text
 
 
+@pytest.mark.parametrize("beats", [True, False])
+def test_two_waves_that_beat_are_one_that_grows_with_the_load(nothing_missing, beats):
+    """Their lengths differ by less than the motion tells; two of lengths of their own are two."""
+    bench, motion = nothing_missing[0], nothing_missing[0].data.motion
+    theta, deflection = motion.theta[:, HIP], motion.deflection[:, HIP]
+    one = deflection / np.abs(deflection).max() * np.sin(12.0 * theta + 0.4)
+    two = 0.5 * np.sin(12.0 * theta) + 0.4 * np.sin(29.0 * theta)
+    bench = with_torque(bench, (HIP, one if beats else two))
+    orders = (10.5, 13.5) if beats else (12.0, 29.0)
+    waves = [replace(make_effect("torque_ripple", "hip", order=o), number=k + 1) for k, o in enumerate(orders)]
+    selection = found(bench, *waves)
+    pairs = [each for each in unnamed(bench, selection, None) if each.second is not None]
+    assert [each.relative for each in pairs] == ["torque_ripple growing with the load"] * beats
+    for each in pairs:
+        assert bench.again(each.solution, selection.final.noise).effects[-1].order == pytest.approx(12.0, abs=0.5)
+        assert "are what one effect alone does as well: torque_ripple growing with the load" in each.sentence
+
+
 def test_what_is_there_keeps_its_name_where_something_else_is_missing(nothing_missing):
     bench, motion = nothing_missing[0], nothing_missing[0].data.motion
     ripple = 0.5 * np.sin(4.0 * motion.theta[:, HIP] + 0.3)
