@@ -63,8 +63,6 @@ TRIED_FOR_TWO = 4
 ALL_OF_IT = 0.9
 """Share of what two effects explain that one in the place of both must promise before it is fitted [-]."""
 
-_GROWING = "growing with"
-
 
 @dataclass(frozen=True)
 class Unnamed:
@@ -145,10 +143,7 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
         if own.side is second.side:
             family = (*one_sided(own), *one_sided(second), *family)
         if type(own) is type(second):  # two waves that beat are one that grows and fades
-            family = (
-                *(relative for each in (own, second) for relative in relatives_of(bench, fit.effects, each)),
-                *family,
-            )
+            family = (*family, *_grown(bench, fit, own), *_grown(bench, fit, second))
         if not family:
             continue
         others = [e for k, e in enumerate(fit.effects) if k not in (one, two)]
@@ -166,9 +161,7 @@ def _one_for_two(bench: Bench, now: Settled, selection: Selection, held: HeldOut
             if new.statistic - fit.statistic < EQUALLY_GOOD * fit.unit and _transfers(new, selection, held):
                 share = new.excess / max(fit.excess, 1.0)
                 other = second.title.removesuffix(f" at {second.joint}")
-                words = _in_words(candidate.effect)
-                words = f"{own.name} {words}" if words.startswith(_GROWING) else words
-                found.append(Unnamed(own.name, own.joint, words, share, new.solution, other))
+                found.append(Unnamed(own.name, own.joint, _whole(candidate.effect), share, new.solution, other))
                 break
     return tuple(found)
 
@@ -242,6 +235,17 @@ class _InPlace:
         return Unnamed(own.name, own.joint, _in_words(new.effects[position]), share, new.solution)
 
 
+def _grown(bench: Bench, fit: Fit, effect: Effect) -> tuple[Effect, ...]:
+    """Relatives of an effect that grow with a signal of its joint."""
+    return tuple(relative for relative in relatives_of(bench, fit.effects, effect) if relative.growth is not None)
+
+
+def _whole(relative: Effect) -> str:
+    """A relative in words that stand alone."""
+    words = _in_words(relative)
+    return f"{relative.name} {words}" if isinstance(relative, Relative) and relative.growth is not None else words
+
+
 def _in_words(relative: Effect) -> str:
     if isinstance(relative, EndStop | Creep | ScaledEncoder):
         return relative.in_words
@@ -250,6 +254,6 @@ def _in_words(relative: Effect) -> str:
     if isinstance(relative, Relative) and relative.only is not None:
         return f"{relative.name} {relative.only}"
     if isinstance(relative, Relative) and relative.growth is not None:
-        return f"{_GROWING} the {relative.growth}"
+        return f"growing with the {relative.growth}"
     driver = relative.driver if isinstance(relative, Relative) else None
     return f"driven by {driver.joint if driver is not None else 'another joint'}"

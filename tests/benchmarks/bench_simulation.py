@@ -3,13 +3,14 @@
     python tests/benchmarks/bench_simulation.py [--repeats 5]
 
 Prints the real-time factor (simulated time over CPU time of one core, settling included) with its spread, and how the
-error falls with the step. Nothing is asserted here.
+error falls with the step, and what the steps that are taken by default leave. Nothing is asserted here.
 """
 
 import argparse
 import platform
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from sea_ident.simulation import (
     PreslidingCoulomb,
     SensorNoise,
     SmoothCoulomb,
+    plant_from_robot,
     simulate,
 )
 
@@ -61,8 +63,9 @@ def real_time_factors(repeats: int) -> None:
         for seed in range(repeats):
             begin = time.process_time()
             run = simulate(robot, series, seed=seed, **options)
-            factors.append(run.steps * run.step / (time.process_time() - begin))
-        per_step = 1e6 * run.step / np.median(factors)
+            simulated = (run.settling_periods + run.periods) * run.period
+            factors.append(simulated / (time.process_time() - begin))
+        per_step = 1e6 * simulated / np.median(factors) / run.steps
         print(f"{name:32s}{np.median(factors):8.1f}{min(factors):8.1f}{max(factors):8.1f}{per_step:13.1f}")
 
 
@@ -90,6 +93,30 @@ def step_table() -> None:
             before = errors[0]
 
 
+def usual_step_table() -> None:
+    """The steps that a simulation takes by itself, and short ones alone, against steps of a sixteenth of a sample."""
+    rigid = replace(plant_from_robot(ur10()), coulomb_friction=np.array([6.7, 8.0, 6.4, 1.0, 1.0, 1.0]))
+    plants = [("exo_leg", plant_from_robot(load_robot("exo_leg"))), ("Baxter arm", plant_from_robot(baxter_arm()))]
+    print("\nsteps by default, one period of 10 s after settling: largest error against steps of 0.31 ms or less")
+    print(f"  {'':22s}{'steps':>8s}{'CPU [s]':>10s}{'q [rad]':>12s}{'tau_motor [N m]':>17s}")
+    for name, plant in (*plants, ("UR10 with friction", rigid)):
+        robot = plant.robot
+        series = modest_series(robot, base_frequency=0.1, harmonics=6)
+        quiet = {"plant": plant, "periods": 1, "sensors": SensorNoise.none(), "jitter": FrictionJitter.none()}
+        begin = simulate(robot, series, **quiet).motion
+        usual_step = simulate(robot, series, start=begin, **quiet).step
+        truth = simulate(robot, series, start=begin, step=min(0.005 / 16, 0.5 * usual_step), **quiet)
+        for label, step in ((name, None), ("  short steps alone", usual_step)):
+            start = time.process_time()
+            run = simulate(robot, series, start=begin, step=step, **quiet)
+            spent = time.process_time() - start
+            error_q, error_tau = (
+                np.abs(one - other).max()
+                for one, other in ((run.motion.q, truth.motion.q), (run.tau_motor, truth.tau_motor))
+            )
+            print(f"  {label:22s}{run.steps:8d}{spent:10.2f}{error_q:12.2e}{error_tau:17.2e}")
+
+
 def settling_table() -> None:
     print("\nsettling to 1e-8")
     for name, robot in (("exo_leg", load_robot("exo_leg")), ("Baxter arm", baxter_arm()), ("UR10", ur10())):
@@ -102,4 +129,5 @@ if __name__ == "__main__":
     parser.add_argument("--repeats", type=int, default=5)
     real_time_factors(parser.parse_args().repeats)
     step_table()
+    usual_step_table()
     settling_table()

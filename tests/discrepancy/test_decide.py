@@ -15,7 +15,7 @@ from sea_ident.discrepancy.edges import at_centre
 from sea_ident.discrepancy.exchange import exchange
 from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.heldout import Kind, tried
-from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, penalty
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, next_effect
 from sea_ident.discrepancy.settle import Settled, settle
@@ -72,7 +72,7 @@ def test_what_does_the_same_on_the_other_motion_is_worth_the_same(rivals):
     for own, rival in (("spring_offset", "spring_hysteresis"), ("spring_hysteresis", "spring_offset")):
         held = tried(other, chosen[own], "another motion")
         worth = held.worth(chosen[rival], position)
-        assert abs(worth.statistic - held.transfers[0].statistic) < 10.0
+        assert abs(worth.statistic - held.transfers[0].statistic) < EQUALLY_GOOD
         assert held.worth(chosen[own], position).statistic == pytest.approx(held.transfers[0].statistic, abs=1e-6)
 
 

@@ -172,9 +172,10 @@ def test_two_effects_that_are_one_whose_sign_turns(nothing_missing):
     bench = with_torque(bench, (KNEE, 0.15 * friction.evaluate(bench.state(start.fit.effects)).motor[:, KNEE, 0]))
     both = [make_effect(name, "knee") for name in ("torque_constant", "directional_efficiency")]
     selection = found(bench, *both)
-    # they turn over at a reversal as the friction does not: the constant is a tenth off, whatever the noise
-    found_values = [selection.final.fit.parameters[f"knee.{e.name}"] for e in both]
-    assert found_values == pytest.approx([-0.137, 0.285], rel=0.05)
+    constant, loss = (selection.final.fit.parameters[f"knee.{e.name}"] for e in both)
+    assert loss == pytest.approx(0.3, rel=0.1)
+    # they turn over at a reversal otherwise than the friction does, and both take a little less of it
+    assert constant == pytest.approx(-0.5 * loss, rel=0.1)
     (one,) = unnamed(bench, selection, None)
     assert one.relative == "torque_constant the other way round where the motor is driven"
     fit = bench.again(one.solution, selection.final.noise)
