@@ -21,7 +21,7 @@ SMALL_ERROR = 1e-6
 
 SMALL_RATE_ERROR = 5e-5
 """... and of the speeds [rad/s] or [m/s]: what turns over quickly shows there first. Positions of legs and of arms are
-then as near to those of steps of a twentieth as they are with short steps alone, within 1e-5 rad."""
+then within 1e-5 rad of those with steps of a twentieth; torques at reversals are what suffers first."""
 
 MOST_PARTS = 4
 """Short steps in a long one up to which there are none between."""
