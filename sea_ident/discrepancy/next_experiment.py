@@ -49,7 +49,7 @@ STARTS = 1
 SEEDS = (1, 2, 3, 4)
 """Of the random starts."""
 
-TOLERANCE_FACTOR = 30.0
+TOLERANCE_FACTOR = 300.0
 """Gains too small to go on for, in units of the usual ones: what is told apart is told by far more."""
 
 SAMPLES_PER_HARMONIC = 5
