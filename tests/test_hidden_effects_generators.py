@@ -194,6 +194,20 @@ def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.En
     assert after < LEFT_OVER.get(entry.effect, 0.03) * before
 
 
+@pytest.mark.parametrize("form", ["library", "lugre"])
+def test_friction_with_a_memory_is_right_to_the_second_order_of_the_step(form: str, leg: gap.Gauge) -> None:
+    """As all else is: a bristle that is half a step ahead of its motor bends over a distance that nobody planted."""
+    entry, joint = catalogue.ENTRIES[("presliding_friction", form)], 1
+    planted = catalogue.draw_effect(entry, leg, joint, 0.03, generator(3))
+    assert planted is not None
+    coarse, middle, fine = (
+        simulate_mujoco(leg.truth, leg.series, 1, planted=(planted,), friction=leg.friction, step=step).tau_motor
+        for step in (1e-3, 5e-4, 2.5e-4)
+    )
+    # of the first order the ratio is 3, of the second 5
+    assert np.linalg.norm((coarse - fine)[:, joint]) > 4.0 * np.linalg.norm((middle - fine)[:, joint])
+
+
 def sensed_motion(exact: Exact, seen: dict[str, np.ndarray]) -> Motion:
     """Motion as the sensors show it, q differentiated within its band."""
     samples = len(exact.motion)

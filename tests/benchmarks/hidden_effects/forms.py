@@ -146,7 +146,8 @@ def _lugre(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped
         z = memory[0]
         new = end + (z - end) * exp(-rate * step)
         memory[0] = new
-        return stiffness * new + micro * (new - z) / step
+        # speeds are those between the steps of the position: so is what they move the bristle to
+        return stiffness * 0.5 * (z + new) + micro * (new - z) / step
 
     hooks[i].bristle = law
 

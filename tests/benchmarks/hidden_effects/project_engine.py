@@ -87,8 +87,8 @@ def planted_effects(
             yield one(*turn, order=s["order"])
         case "torque_offset" | "spring_offset" | "torque_saturation":
             yield one(c)
-        case "torque_constant":
-            yield one(-c)
+        case "torque_constant":  # here what is recorded is more by it, there it is divided
+            yield one(1.0 / (1.0 + c) - 1.0)
         case "asymmetric_spring":
             yield one(c * truth.stiffness[i], exponent=1.0)
         case "spring_hysteresis":
