@@ -13,7 +13,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit, Known
-from sea_ident.discrepancy.free_shapes import free_shapes, moved, room
+from sea_ident.discrepancy.free_shapes import free_shapes, moved_within, room
 from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import (
     REPEATED_VARIANCE,
@@ -183,10 +183,10 @@ class Bench(ParameterFits):
             damped = normal + np.diag(RIDGE + needed / strength[seen] ** 2)
             inner[free] = _within(damped[np.ix_(free, free)], gradient[free], rooms[:, free])
             step[seen] = part * np.clip(inner / strength[seen], -1.0, 1.0)
-            effects = list(fit.effects)
+            effects = fit.effects
             for (position, shape), amount in zip(shapes, step, strict=True):
-                effects[position] = moved(effects[position], shape, float(amount))
-            if tuple(effects) == fit.effects:
+                effects = moved_within(effects, position, shape, float(amount))
+            if effects == fit.effects:
                 return None
             # parameters go along with the shapes: a spring that is less of a compliance must be stiffer
             ahead = fit.values + follow @ step

@@ -8,6 +8,7 @@ import numpy as np
 
 from sea_ident.effects import Effect, JointEffect, Shape
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
+from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring_stiffening import BESIDE_CUBIC, CUBIC, SpringStiffening
@@ -97,6 +98,28 @@ def moved(effect: Effect, shape: Shape, step: float) -> Effect:
     new = value * np.exp(step) if shape.logarithmic else value + step * (shape.upper - shape.lower)
     within = float(np.clip(new, min(shape.lower, value), max(shape.upper, value)))
     return replace(effect, **{shape.name: within})  # type: ignore[arg-type]
+
+
+def moved_within(effects: Sequence[Effect], position: int, shape: Shape, step: float) -> tuple[Effect, ...]:
+    """A model with one shape of one effect moved, and with it what is anchored in that shape.
+
+    What turns over at the speed that the Coulomb friction of its motor does moves along: by itself it would follow one
+    fit too late, and where it is much larger than that friction, the speed would swing from fit to fit.
+    """
+    there = moved(effects[position], shape, step)
+    return tuple(
+        there if k == position else _along(effect, effects[position], there) for k, effect in enumerate(effects)
+    )
+
+
+def _along(effect: Effect, one: Effect, there: Effect) -> Effect:
+    """An effect of the same joint where another one moved."""
+    if not (isinstance(one, CoulombFriction) and isinstance(there, CoulombFriction) and effect.joint == one.joint):
+        return effect
+    own = all(shape.name != "smoothing" for shape in effect.shapes)
+    if own and getattr(effect, "smoothing", None) == one.smoothing:
+        return replace(effect, smoothing=there.smoothing)  # type: ignore[call-arg]
+    return effect
 
 
 def room(effect: Effect, shape: Shape) -> tuple[float, float]:

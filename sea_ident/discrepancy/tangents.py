@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Columns, Evaluated
 from sea_ident.discrepancy.data import EquationKind, PeriodData, spectrum
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.free_shapes import distance, moved, signal_effects
+from sea_ident.discrepancy.free_shapes import distance, moved_within, signal_effects
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.effects import Column, Contribution, Effect, JointEffect, Shape, Side, State, corrected_motion
 from sea_ident.effects.load import LoadEffect
@@ -121,14 +121,17 @@ class Tangents(Columns):
                 # `moved` counts in ranges of the amount
                 out[:, :, k], slopes[:, k] = ((shape.upper - shape.lower) * part for part in (torque, slope))
                 continue
-            own = values[starts[position] : starts[position + 1]]
-            low, high = (moved(effect, shape, step) for step in (-1e-3, 1e-3))
-            state, apart = self.state(effects), distance(low, high, shape)
-            parts = [e.evaluate(state) for e in (low, high)]
-            change = Contribution(
-                (parts[1].link - parts[0].link) @ own / apart, (parts[1].motor - parts[0].motor) @ own / apart
-            )
-            out[:, :, k] = self._spectra(change, signal_effects(effects))
+            low, high = (moved_within(effects, position, shape, step) for step in (-1e-3, 1e-3))
+            state, apart = self.state(effects), distance(low[position], high[position], shape)
+            for j, pair in enumerate(zip(low, high, strict=True)):
+                if pair[0] is pair[1]:
+                    continue
+                own = values[starts[j] : starts[j + 1]]
+                parts = [e.evaluate(state) for e in pair]
+                change = Contribution(
+                    (parts[1].link - parts[0].link) @ own / apart, (parts[1].motor - parts[0].motor) @ own / apart
+                )
+                out[:, :, k] += self._spectra(change, signal_effects(effects))
             if effect.side is Side.SPRING:
                 slopes[:, k] = self.slopes_of(out[:, :, k : k + 1], self.links_of(effect), effects)[:, 0]
         return out, slopes

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.free_shapes import free_shapes, moved, room
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, moved_within, room
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
+from sea_ident.simulation import SensorNoise
 
 PUSH = {"start": 2.0, "stop": 3.0, "period": 5.0}
 
@@ -82,6 +84,39 @@ def test_a_power_of_the_speed_passes_one_on_its_way(laboratory, monkeypatch, beg
     amount = next(k for k, column in enumerate(fit.columns) if column.name == f"knee.{law}")
     assert fit.values[amount] == pytest.approx(9.0, abs=4.0 * fit.std(amount))
     assert len(steps) < 12
+
+
+def test_only_what_is_anchored_in_the_friction_of_a_motor_moves_with_it():
+    friction, other = make_effect("coulomb_friction", "hip"), make_effect("coulomb_friction", "knee")
+    loss, away = (make_effect("load_dependent_friction", joint) for joint in ("hip", "knee"))
+    sharper = make_effect("stribeck_friction", "hip", smoothing=0.5 * friction.smoothing)
+    model = (friction, other, loss, away, sharper)
+    there = moved_within(model, 0, friction.shapes[0], np.log(2.0))
+    twice = 2.0 * friction.smoothing
+    assert [e.smoothing for e in there] == pytest.approx(
+        [twice, other.smoothing, twice, away.smoothing, sharper.smoothing]
+    )
+    order = make_effect("torque_ripple", "hip").shapes[0]
+    ripple = make_effect("torque_ripple", "hip")
+    assert moved_within((ripple, friction, loss), 0, order, 0.1)[1:] == (friction, loss)
+
+
+@pytest.mark.scenario
+def test_a_loss_that_is_much_larger_than_the_friction_beside_it_settles(laboratory):
+    """The speed around which both turn over is one shape of both: it swung from fit to fit, and the misfit by two."""
+    sensors = SensorNoise(1e-5, 5e-6, link_resolution=0.0, motor_resolution=0.0, current=0.005)
+    planted = [("load_dependent_friction", "hip", [0.3], {"smoothing": 0.01})]
+    bench = laboratory.bench(laboratory.record(planted, sensors=sensors))
+    start = settle(bench, bench.effects)
+    model = (*start.fit.effects, make_effect("load_dependent_friction", "hip"))
+    now = settle_again(bench, bench.refine(model, start.noise, start=start.fit.parameters))
+    again = settle_again(bench, now.fit)
+    assert again.fit.statistic == pytest.approx(now.fit.statistic, rel=0.02)
+    friction = next(e for e in again.fit.effects if (e.name, e.joint) == ("coulomb_friction", "hip"))
+    assert friction.smoothing == pytest.approx(0.01, rel=0.1)
+    amount = again.fit.parameters["hip.load_dependent_friction"]
+    told = uncertainties(bench, again)[[c.name for c in again.fit.columns].index("hip.load_dependent_friction")]
+    assert amount == pytest.approx(0.3, abs=3.0 * told)
 
 
 def test_a_shape_has_the_room_that_is_left_in_its_range():

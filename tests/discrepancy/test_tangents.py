@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.free_shapes import free_shapes, moved
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, moved_within
 from sea_ident.effects import corrected_motion, effect_classes, make_effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.signal import SignalEffect
@@ -117,6 +117,21 @@ def test_at_the_end_of_its_range_or_beyond_a_shape_has_the_slope_from_within(not
     changed = [*effects[:-1], moved(effects[-1], pair[1], step)]
     decrease = (scaled_residual(bench, effects, parameters) - scaled_residual(bench, changed, parameters)) / step
     assert np.linalg.norm(decrease - tangent) < 0.01 * np.linalg.norm(decrease)
+
+
+@pytest.mark.parametrize("name", ["stribeck_friction", "load_dependent_friction", "position_dependent_friction"])
+def test_what_turns_over_with_the_friction_moves_with_it(nothing_missing, name):
+    bench, _ = nothing_missing
+    effects, parameters, _ = far_off(bench, [make_effect(name, "knee")])
+    fit = bench.predicted(effects, parameters)
+    position = next(k for k, e in enumerate(effects) if (e.name, e.joint) == ("coulomb_friction", "knee"))
+    shape = effects[position].shapes[0]
+    parts = bench.tangents(tuple(effects), fit.columns, fit.values, [(position, shape)])
+    tangent = bench.scaled(*parts, fit.residual, scale_of(bench, fit), bench.stiffness_of(fit))[:, :, 0]
+    low, high = (moved_within(effects, position, shape, step) for step in (-STEP, STEP))
+    assert [one.name for one, other in zip(low, high, strict=True) if one != other] == ["coulomb_friction", name]
+    decrease = (scaled_residual(bench, low, parameters) - scaled_residual(bench, high, parameters)) / (2.0 * STEP)
+    assert np.linalg.norm(decrease - tangent) < 2e-4 * np.linalg.norm(decrease)
 
 
 @pytest.mark.parametrize("case", TOGETHER)
