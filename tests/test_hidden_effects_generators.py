@@ -31,6 +31,7 @@ from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_muj
 from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
+from tests.benchmarks.hidden_effects.sizes import SIZES, WAVES, size_errors
 from tests.benchmarks.hidden_effects.trajectories import draw_trajectory
 
 SMOOTHING = 0.02
@@ -192,6 +193,23 @@ def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.En
     after = np.sqrt(np.mean(residual(corrected_motion(robot, signals, motion), columns, signals) ** 2))
     assert before > 5e-4
     assert after < LEFT_OVER.get(entry.effect, 0.03) * before
+
+
+@pytest.mark.parametrize("effect", [*SIZES, *WAVES, "torque_constant", "torque_delay"])
+def test_the_project_plants_what_the_score_asks_for(effect: str, leg: gap.Gauge) -> None:
+    """The sizes of a truth mean the same in both engines."""
+    entry, robot, joint = catalogue.ENTRIES[(effect, "library")], leg.truth.robot, 1
+    _, size, shape = entry.draw(catalogue.Place(leg, joint, generator(9, 12)))
+    planted = Planted(
+        effect, robot.joint_names[joint], "library", -size if effect == "torque_constant" else size, shape
+    )
+    (there,) = planted_effects(planted, leg.truth, SMOOTHING, leg.series.period, 1)
+    told = {column.name: value for column, value in zip(there.effect.columns(robot), there.values, strict=True)}
+    told |= {there.effect.parameter_name(s.name): getattr(there.effect, s.name) for s in there.effect.ranges}
+    entries = [{"name": name, "value": float(value), "std": 1.0} for name, value in told.items()]
+    errors = size_errors(planted, {"parameters": entries})
+    assert errors
+    assert errors == pytest.approx(np.zeros(len(errors)), abs=1e-12)
 
 
 @pytest.mark.parametrize("form", ["library", "lugre"])

@@ -8,7 +8,7 @@ import pytest
 from sea_ident.discrepancy.free_shapes import free_shapes, moved, moved_within, room
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.discrepancy.uncertainty import uncertainties
-from sea_ident.effects import make_effect
+from sea_ident.effects import effect_classes, make_effect
 from sea_ident.simulation import SensorNoise
 
 PUSH = {"start": 2.0, "stop": 3.0, "period": 5.0}
@@ -99,6 +99,19 @@ def test_only_what_is_anchored_in_the_friction_of_a_motor_moves_with_it():
     order = make_effect("torque_ripple", "hip").shapes[0]
     ripple = make_effect("torque_ripple", "hip")
     assert moved_within((ripple, friction, loss), 0, order, 0.1)[1:] == (friction, loss)
+
+
+@pytest.mark.parametrize("name", sorted(name for name, kind in effect_classes().items() if hasattr(kind, "smoothing")))
+def test_a_model_whose_friction_moved_is_anchored_in_it_already(nothing_missing, name):
+    """Whatever turns over at the speed that the friction does."""
+    bench, now = nothing_missing
+    effect = next(e for e in effect_classes()[name].instances(bench.robot) if e.joint == "knee")
+    others = [e for e in now.fit.effects if (e.name, e.joint) != (name, "knee")]
+    model = bench.anchored((*others, effect), now.fit.parameters)
+    frictions = [k for k, e in enumerate(model) if (e.name, e.joint) == ("coulomb_friction", "knee")]
+    moved_model = moved_within(model, frictions[0], model[frictions[0]].shapes[0], 0.3)
+    assert moved_model != model
+    assert bench.anchored(moved_model, now.fit.parameters) == moved_model
 
 
 @pytest.mark.scenario
