@@ -25,7 +25,7 @@ from sea_ident.discrepancy.next_effect import (
 )
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.powers import with_their_powers
-from sea_ident.discrepancy.settle import Settled, settle, settle_again
+from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
 
@@ -150,7 +150,7 @@ def search(
             break
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
-    return replace(whole, final=now, added=len(added), p_values=tuple(added), whole=whole)
+    return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
 
 
 def _lost(now: Settled, before: Settled, added: int, candidates: Sequence[Candidate]) -> bool:

@@ -26,6 +26,13 @@ up most of the floor, ..."""
 CONSISTENT = 1.0
 """... until the floor has about what the fit makes of these steps: their share of it is one at most [-]."""
 
+ANCHORED = 0.3
+"""Size, in standard deviations of the noise, of a change that effects are not made to follow any more [-]: an estimate
+is off by that at most, ..."""
+
+MOST_ANCHORINGS = 8
+"""... or rounds after which they are as they are."""
+
 COMMON = 2.5
 """... or they change by less than this factor: as much as one motor may differ from another."""
 
@@ -85,6 +92,33 @@ def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Set
         if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
             return Settled(straight, noise)
     return Settled(bent, noise)
+
+
+def anchored_in_itself(bench: Bench, now: Settled) -> Settled:
+    """A model that explains the recording, its effects as they are with what the model says of loads and springs.
+
+    An effect that depends on the rest of the model, or on its own size, was found with what that was a fit before. Where
+    each round leaves a quarter of the error, a handful are needed before that is less than what noise does.
+
+    Args:
+        bench: the recording.
+        now: the model; one that lacks more is left as it is, for its sizes are wrong by what it lacks.
+    """
+    for _ in range(MOST_ANCHORINGS):
+        if now.fit.statistic > FAR * now.fit.dof or _still_to_follow(bench, now) < ANCHORED:
+            break
+        now = settle_again(bench, now.fit)
+    return now
+
+
+def _still_to_follow(bench: Bench, now: Settled) -> float:
+    """By how much the torque of a model changes where its effects follow it, in standard deviations of the noise [-]."""
+    fit = now.fit
+    anchored = bench.anchored(fit.effects, fit.parameters)
+    if anchored == fit.effects:
+        return 0.0
+    change = (bench.design(anchored) - bench.design(fit.effects)) @ fit.values
+    return float(np.linalg.norm(bench.whitening(now.noise).flat(change * fit.scale)))
 
 
 def far_from(effects: Sequence[Effect], usual: Sequence[Effect]) -> bool:
