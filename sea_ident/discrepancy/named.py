@@ -69,13 +69,15 @@ def named_effect(
     effect, counts = fit.effects[position], bench.counts(fit.effects)
     own = range(sum(counts[:position]), sum(counts[: position + 1]))
     seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
-    by_rest = _told_by_rest(bench, fit, effect, fit.values[own.start : own.stop])
+    values = fit.values[own.start : own.stop]
+    by_rest = _told_by_rest(bench, fit, effect, values)
     parameters = [
         MissingParameter(fit.columns[i].name, float(fit.values[i]), float(np.hypot(stds[i], more)), fit.columns[i].unit)
         for i, more, shown in zip(own, by_rest, seen, strict=True)
         if shown
     ]
-    parameters.extend(_shape_parameters(bench, fit, position, stds))
+    at_rest = bool(len(values)) and bool(np.all(by_rest >= np.abs(values)))
+    parameters.extend(_shape_parameters(bench, fit, position, stds, at_rest))
     return MissingEffect(
         effect=effect.name,
         joint=effect.joint,
@@ -97,7 +99,10 @@ def _told_by_rest(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) ->
     return np.asarray(np.linalg.norm(off[3:], axis=1), dtype=np.float64)
 
 
-def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray) -> list[MissingParameter]:
+def _shape_parameters(
+    bench: Bench, fit: Fit, position: int, stds: FloatArray, at_rest: bool
+) -> list[MissingParameter]:
+    """The shapes of an effect; what is at rest all the time does not show where it would not be."""
     effect = fit.effects[position]
     out = []
     for shape in effect.ranges:
@@ -107,6 +112,7 @@ def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray) -
             if owner == position and free.name == shape.name:
                 step = float(stds[len(fit.columns) + k])
                 std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
+                std = float(np.hypot(std, value)) if at_rest else std
         out.append(
             MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
         )

@@ -1,0 +1,56 @@
+"""Models in the noise floor, and around the loads, that belong to them."""
+
+import pytest
+
+from sea_ident.discrepancy.settle import FAR, Settled, anchored_in_itself, settle
+from sea_ident.effects import make_effect
+
+SATURATION = 1e-3
+
+
+@pytest.fixture(scope="module")
+def saturated(laboratory):
+    """Bench, and the usual model, settled: a leg whose knee motor saturates."""
+    bench = laboratory.bench(laboratory.record([("torque_saturation", "knee", [SATURATION], {"exponent": 3.0})]))
+    return bench, settle(bench, bench.effects)
+
+
+def with_saturation(bench, start):
+    """A fit with it, by the torque that the motor gives as long as nothing is known of it."""
+    cube = make_effect("torque_saturation", "knee")
+    anchored = bench.anchored((*start.fit.effects, cube), start.fit.parameters)
+    return bench.refine(anchored, start.noise, start=start.fit.parameters, only=len(bench.effects))
+
+
+def off(now):
+    """Error of the saturation, in standard deviations."""
+    last = next(k for k, c in enumerate(now.fit.columns) if c.name == "knee.torque_saturation")
+    return (now.fit.values[last] - SATURATION) / now.fit.std(last)
+
+
+def test_effects_are_followed_until_they_stand_where_the_model_puts_them(saturated):
+    bench, start = saturated
+    begun = Settled(fit := with_saturation(bench, start), bench.noise(fit))
+    assert off(begun) > 5.0
+    there = anchored_in_itself(bench, begun)
+    assert there.fit.statistic < 1.2 * there.fit.dof
+    assert abs(off(there)) < 2.5
+    saturation = there.fit.effects[-1]
+    assert saturation.coefficient == pytest.approx(there.fit.parameters["knee.torque_saturation"], rel=1e-2)
+    assert anchored_in_itself(bench, there) is there
+
+
+def test_what_depends_on_nothing_stays_as_it_is(nothing_missing):
+    bench, now = nothing_missing
+    assert anchored_in_itself(bench, now) is now
+
+
+def test_a_model_that_lacks_more_is_left_alone(saturated):
+    """Its sizes are wrong by what it lacks, and rounds would be lost."""
+    bench, start = saturated
+    loss = make_effect("load_dependent_friction", "knee")
+    fit = bench.fit((*start.fit.effects, loss), start.noise, start=start.fit.parameters)
+    assert bench.anchored(fit.effects, fit.parameters) != fit.effects
+    lacking = Settled(fit, start.noise)
+    assert fit.statistic > FAR * fit.dof
+    assert anchored_in_itself(bench, lacking) is lacking
