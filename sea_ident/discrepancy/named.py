@@ -99,9 +99,7 @@ def _told_by_rest(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) ->
     return np.asarray(np.linalg.norm(off[3:], axis=1), dtype=np.float64)
 
 
-def _shape_parameters(
-    bench: Bench, fit: Fit, position: int, stds: FloatArray, at_rest: bool
-) -> list[MissingParameter]:
+def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray, at_rest: bool) -> list[MissingParameter]:
     """The shapes of an effect; what is at rest all the time does not show where it would not be."""
     effect = fit.effects[position]
     out = []

@@ -97,8 +97,8 @@ def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Set
 def anchored_in_itself(bench: Bench, now: Settled) -> Settled:
     """A model that explains the recording, its effects as they are with what the model says of loads and springs.
 
-    An effect that depends on the rest of the model, or on its own size, was found with what that was a fit before. Where
-    each round leaves a quarter of the error, a handful are needed before that is less than what noise does.
+    An effect that depends on the rest of the model, or on its own size, was found with what that was a fit before.
+    Where each round leaves a quarter of the error, it takes a handful until that is less than what noise does.
 
     Args:
         bench: the recording.
@@ -112,7 +112,7 @@ def anchored_in_itself(bench: Bench, now: Settled) -> Settled:
 
 
 def _still_to_follow(bench: Bench, now: Settled) -> float:
-    """By how much the torque of a model changes where its effects follow it, in standard deviations of the noise [-]."""
+    """By how much the torque of a model changes where its effects follow it, in standard deviations of noise [-]."""
     fit = now.fit
     anchored = bench.anchored(fit.effects, fit.parameters)
     if anchored == fit.effects:

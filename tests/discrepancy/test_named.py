@@ -10,9 +10,7 @@ from sea_ident.effects import make_effect
 
 
 @pytest.mark.parametrize(("share", "known"), [(0.1, True), (0.6, False)])
-def test_where_dry_friction_in_a_spring_slips_shows_only_where_it_does(
-    laboratory, nothing_missing, share, known
-):
+def test_where_dry_friction_in_a_spring_slips_shows_only_where_it_does(laboratory, nothing_missing, share, known):
     """What sticks all the time is a spring and a constant, whatever it would slip at."""
     usual, start = nothing_missing
     slip = share * float(np.ptp(usual.data.motion.deflection[:, 0]))
