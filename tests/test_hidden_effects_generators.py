@@ -195,7 +195,7 @@ def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.En
     assert after < LEFT_OVER.get(entry.effect, 0.03) * before
 
 
-@pytest.mark.parametrize("effect", [*SIZES, *WAVES, "torque_constant", "torque_delay"])
+@pytest.mark.parametrize("effect", [*SIZES, *WAVES, "spring_hysteresis", "torque_constant", "torque_delay"])
 def test_the_project_plants_what_the_score_asks_for(effect: str, leg: gap.Gauge) -> None:
     """The sizes of a truth mean the same in both engines."""
     entry, robot, joint = catalogue.ENTRIES[(effect, "library")], leg.truth.robot, 1

@@ -11,6 +11,7 @@ SIZES = {
     "stribeck_friction": ("", "speed", "exponent"),
     "nonlinear_viscous_friction": ("", "exponent"),
     "load_dependent_friction": ("",),
+    "directional_efficiency": ("",),
     "torque_offset": ("",),
     "torque_saturation": ("",),
     "spring_offset": ("",),
@@ -47,6 +48,8 @@ def size_errors(planted: Planted, entry: Mapping[str, Any]) -> list[float]:
         phase = planted.shape["phase"]
         truth = {"sine": planted.size * np.cos(phase), "cosine": planted.size * np.sin(phase)}
         truth |= {"order": planted.shape["order"]} if "order" in planted.shape else {}
+    if planted.effect == "spring_hysteresis":  # of two elements that share its force
+        truth = {"narrow": 0.5 * planted.size, "wide": 0.5 * planted.size, "slip": planted.shape["width"]}
     if planted.effect == "torque_constant":
         truth = {"": 1.0 / (1.0 + planted.size) - 1.0}
     if planted.effect == "torque_delay":  # a measured torque that is late is what the model's comes before
