@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.untold import BesideFit, in_base, widened
 from sea_ident.effects import Effect, Side, spring_effects
@@ -105,25 +106,34 @@ def with_what_it_misses(model: Model, observations: Observations, fit: Fit) -> M
     if known is None:
         return model
     there, factor = known
-    own = regular_covariance(model)
+    own, fitted = regular_covariance(model), factor @ factor.T
     blind = np.sqrt(np.diag(own)) > BLIND * np.linalg.norm(factor, axis=1)
     linked = model.robot.elastic_indices.size > 0
     sides = [base.columns[i].side for i in base.independent]
     told = [k for k, side in enumerate(sides) if blind[k] or (linked and side is not Side.MOTOR)]
     if not told:
         return model
-    other = factor[told] @ factor[told].T
-    gain = own[:, told] @ np.linalg.inv(own[np.ix_(told, told)] + other)
+    gain = own[:, told] @ np.linalg.inv((own + fitted)[np.ix_(told, told)])
     values = model.values + gain @ (there[told] - model.values[told])
     left = np.eye(len(values))
     left[:, told] -= gain
-    covariance = left @ own @ left.T + gain @ other @ gain.T
+    # the fit knows all that the model knows: errors of the model are those of the fit, and some of its own beside them
+    covariance = fitted + left @ _positive(own - fitted) @ left.T
+    repeatability = left @ model.uncertainty.repeatability @ left.T  # of periods the fit has no influences
     uncertainty = replace(
         model.uncertainty,
-        covariance=covariance,
-        repeatability=covariance,
+        covariance=repeatability + _positive(covariance - repeatability),
+        repeatability=repeatability,
         influences=model.uncertainty.influences @ left.T,
     )
     information = model.information.copy()
-    information[np.ix_(told, told)] += np.linalg.inv(other)
+    information[np.ix_(told, told)] += np.linalg.inv(fitted[np.ix_(told, told)])
     return with_values(replace(model, uncertainty=uncertainty, information=information), observations, values)
+
+
+def _positive(symmetric: FloatArray) -> FloatArray:
+    """The part (b, b) of a symmetric matrix that is a covariance, in units in which its diagonal is one."""
+    scale = np.sqrt(np.maximum(np.abs(np.diag(symmetric)), 1e-300))
+    strength, directions = np.linalg.eigh(symmetric / np.outer(scale, scale))
+    root = scale[:, None] * directions * np.sqrt(np.maximum(strength, 0.0))
+    return np.asarray(root @ root.T, dtype=np.float64)
