@@ -10,6 +10,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.untold import in_base
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.estimation import identify, physical_parameters, read_model
 from sea_ident.exceptions import SeaIdentWarning
@@ -82,6 +83,24 @@ def test_a_repaired_model_is_a_model_like_any_other(laboratory, leg, series, tmp
 
 
 @pytest.mark.slow
+def test_a_repaired_model_is_as_unsure_as_the_fit_that_it_comes_from(nothing_missing, laboratory, leg):
+    """Both know the torques of the motors: put together as if they were strangers, those would count twice."""
+    _, now = nothing_missing
+    recording = laboratory.record()
+    processed = process(recording, leg, period=PERIOD)
+    model = repaired_model(identified(leg, recording), processed, now.fit)
+    _, factor = in_base(now.fit, model.base)
+    assert np.all(model.uncertainty.std > 0.99 * np.linalg.norm(factor, axis=1))
+    names = [column.name for column in now.fit.columns]
+    for spring in model.springs:
+        for told, name in (
+            (spring.stiffness_std, "spring_stiffness"),
+            (spring.cubic_stiffness_std, "spring_stiffening"),
+            (spring.damping_std, "spring_damping"),
+        ):
+            assert told > 0.6 * now.fit.std(names.index(f"{spring.joint}.{name}")), (spring.joint, name)
+
+
 def test_what_drifts_is_named_and_is_no_part_of_the_model(leg, series):
     drift = planted("friction_drift", "knee", [0.3, 0.5], time_constant=60.0)
     recording = simulate(leg, series[0], periods=12, seed=70, effects=[drift]).recording
