@@ -231,9 +231,8 @@ def sines(rng: np.random.Generator, amplitude: float) -> tuple[Array, Array]:
     return position, velocity
 
 
-def record(path: Path, case: Case, seed: int, periods: int, amplitude: float) -> None:
-    """Simulate, two periods to settle, and write what the sensors show."""
-    rng = np.random.default_rng(seed)
+def simulated(case: Case, rng: np.random.Generator, periods: int, amplitude: float) -> Array:
+    """(N, 9) positions of links and motors and currents, two periods to settle left out."""
     arm = build(case)
     position, velocity = sines(rng, amplitude)
     count, data = len(position), arm.model.createData()
@@ -253,8 +252,12 @@ def record(path: Path, case: Case, seed: int, periods: int, amplitude: float) ->
         x = x + STEP * v
         if k >= 2 * count and k % every == 0:
             rows.append(np.concatenate([q, theta, command / (RATIO * TORQUE_CONSTANT)]))
-    seen = np.array(rows)
-    q, theta, current = seen[:, :3], seen[:, 3:6], seen[:, 6:]
+    return np.array(rows)
+
+
+def write(path: Path, exact: Array, rng: np.random.Generator) -> None:
+    """Write what the sensors show of that."""
+    q, theta, current = exact[:, :3], exact[:, 3:6], exact[:, 6:]
     fine = ENCODER / 50.0
     q = ENCODER * np.round((q + 0.3 * ENCODER * rng.normal(size=q.shape)) / ENCODER)
     theta = fine * np.round((theta + 0.5 * fine * rng.normal(size=q.shape)) / fine)
@@ -263,6 +266,12 @@ def record(path: Path, case: Case, seed: int, periods: int, amplitude: float) ->
         writer = csv.writer(file)
         writer.writerow(["time", *(f"{kind}_{joint}" for kind in ("q", "theta", "current") for joint in JOINTS)])
         writer.writerows(np.column_stack([np.arange(len(q)) / RATE, q, theta, current]).tolist())
+
+
+def record(path: Path, case: Case, seed: int, periods: int, amplitude: float) -> None:
+    """Simulate, and write what the sensors show."""
+    rng = np.random.default_rng(seed)
+    write(path, simulated(case, rng, periods, amplitude), rng)
 
 
 def command(*arguments: str | Path) -> float:
