@@ -1,6 +1,6 @@
 """What changes from period to period, and is invisible in the mean."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from sea_ident.discrepancy.trend_directions import (
 )
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.discrepancy.trend_search import Chosen, Sized, alike, best_trend, find_trends
-from sea_ident.discrepancy.trend_values import Course, course_values
+from sea_ident.discrepancy.trend_values import course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.side_by_side import side_by_side
@@ -181,6 +181,9 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters)
     whole = {cause.name: cause for cause in causes}
 
+    def inside(direction: Direction) -> FloatArray:
+        return columns.inside(direction, middle, whole[direction.name].temperature)
+
     held = held_basis(
         [replace(c.direction, columns=columns.within(whole[c.direction.name])[-len(flat) :]) for c in chosen]
     )
@@ -195,7 +198,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value
-    trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
+    trends = tuple(_trend(numbers, chosen, k, directions, change, inside) for k in range(len(chosen)))
     soon = [_is_over_soon(bench, c.direction) for c in chosen]
     told = [trend.known(SURE if over else NOT_AT_ALL) for trend, over in zip(trends, soon, strict=True)]
     if not all(told):
@@ -203,7 +206,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
             _not_told(bench, trend, over) for trend, over, known in zip(trends, soon, told, strict=True) if not known
         )
         chosen = [c for c, known in zip(chosen, told, strict=True) if known]
-        trends = tuple(_trend(numbers, chosen, k, directions, change) for k in range(len(chosen)))
+        trends = tuple(_trend(numbers, chosen, k, directions, change, inside) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
@@ -334,13 +337,18 @@ class _Change:
 
 
 def _trend(
-    numbers: FloatArray, chosen: Sequence[Chosen], position: int, directions: Sequence[Direction], change: _Change
+    numbers: FloatArray,
+    chosen: Sequence[Chosen],
+    position: int,
+    directions: Sequence[Direction],
+    change: _Change,
+    inside: Callable[[Direction], FloatArray],
 ) -> Trend:
     """One of the trends that were chosen, its values beside the others, and what else it could be."""
     own, others = chosen[position], [c for k, c in enumerate(chosen) if k != position]
     direction = own.direction
-    beside = [_course(c.direction) for c in others]
-    values, *_ = course_values(numbers, [_course(direction), *beside])
+    beside = [c.direction.course for c in others]
+    values = course_values(numbers, [direction.course, *beside])[0].of_factor(inside(direction))
     held = held_basis([c.direction for c in others])
     taken = {c.direction.name for c in chosen}
     alternatives: dict[Name, tuple[Effect, float]] = {}
@@ -358,7 +366,7 @@ def _trend(
     bends = [d for d in directions if d.name == direction.name and d.bent]
     if bends and not direction.bent:
         bent = max(bends, key=lambda d: gain(numbers, d, held)[0])
-        rival, *_ = course_values(numbers, [_course(bent), *beside])
+        rival = course_values(numbers, [bent.course, *beside])[0].of_factor(inside(bent))
         chance = float(expit(0.5 * (gain(numbers, bent, held)[0] - own.gain - FREE_BEND)))
         stds = _of_either(at_start, stds, _at_start(bent, rival.values), rival.stds, chance)
     return Trend(
@@ -377,10 +385,6 @@ def _at_start(direction: Direction, values: FloatArray) -> FloatArray:
     if not isinstance(direction.effect, TrendEffect):
         return values
     return direction.effect.referred(values, direction.level)
-
-
-def _course(direction: Direction) -> Course:
-    return Course(direction.profile, direction.columns, direction.bend if direction.bent else None)
 
 
 def _of_either(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import interp1d
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
@@ -11,7 +12,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
-from sea_ident.discrepancy.trend_values import bend, time_constants
+from sea_ident.discrepancy.trend_values import Course, bend, time_constants
 from sea_ident.effects import Contribution, Effect, corrected_motion, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
@@ -68,6 +69,11 @@ class Direction:
     def name(self) -> Name:
         """Effect and joint."""
         return self.effect.name, self.effect.joint
+
+    @property
+    def course(self) -> Course:
+        """Its columns with its course, which bends if that was chosen."""
+        return Course(self.profile, self.columns, self.bend if self.bent else None)
 
     def only(self, used: tuple[int, ...]) -> "Direction":
         """The same with some of its columns."""
@@ -192,6 +198,35 @@ class PeriodColumns:
             if np.all(np.linalg.norm(columns, axis=0) > 0.0):
                 found.append(Cause(effect, columns, own))
         return found
+
+    def inside(self, direction: Direction, middle: FloatArray, temperature: FloatArray | None) -> FloatArray:
+        """(k, k) by what the values of a trend are multiplied where its course is that of the middles of the periods.
+
+        What bends changes faster in one half of a period than in the other: where its columns are large in the first
+        half, it was seen earlier than in the middle. A straight course makes every period differ by as much from its
+        middle.
+
+        Args:
+            direction: the trend in its course.
+            middle: (P,) middles of the periods [s].
+            temperature: (P,) of its joint [degC], None where it was not measured or does not matter.
+        """
+        effect, bench, fit = direction.effect, self._bench, self._fit
+        if not isinstance(effect, TrendEffect):
+            raise TypeError(f"{effect.name} is no trend")
+        phase = (np.arange(bench.data.samples) + 0.5) / bench.data.samples - 0.5
+        time = middle[:, None] + bench.data.period * phase
+        own = None
+        if temperature is not None:
+            own = interp1d(middle, temperature, fill_value="extrapolate")(time.ravel())
+        change = effect.change(time.ravel(), own).reshape(time.shape)
+        course = direction.profile @ change / float(direction.profile @ direction.profile)
+        rows = steady_rows(bench, fit, effect)
+        weighted = replace(rows, link=rows.link * course[:, None, None], motor=rows.motor * course[:, None, None])
+        there, middles = (
+            self.flat(bench.spectra_of(part, fit.effects) * fit.scale[:, None]) for part in (weighted, rows)
+        )
+        return np.asarray(np.linalg.lstsq(middles, there, rcond=None)[0], dtype=np.float64)
 
     def within(self, cause: Cause, space: FloatArray | None = None) -> FloatArray:
         """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""

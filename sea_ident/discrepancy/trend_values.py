@@ -44,6 +44,11 @@ class CourseValues:
     stds: FloatArray
     bend_std: float = 0.0
 
+    def of_factor(self, factor: FloatArray) -> "CourseValues":
+        """The values of which these are (k, k) the multiple: see `PeriodColumns.inside`."""
+        values = np.asarray(np.linalg.solve(factor, self.values), dtype=np.float64)
+        return replace(self, values=values, stds=self.stds / np.abs(np.diag(factor)))
+
 
 def time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]:
     """Time constants worth trying where the middles of the periods (P,) are these [s]; with the last it is straight."""

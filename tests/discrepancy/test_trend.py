@@ -15,6 +15,7 @@ from sea_ident.discrepancy.trend import Trend, _is_over_soon, _omnibus, compare_
 from sea_ident.effects import effect_classes, make_effect
 from sea_ident.effects.temperature_friction import TemperatureFriction
 from sea_ident.recordings import Recording
+from sea_ident.simulation import FrictionJitter
 
 LEVEL = 0.05
 DRAWS = 1000
@@ -107,6 +108,16 @@ def test_a_spring_that_warms_up_has_its_first_rate_and_its_time_constant(laborat
     assert (trend.effect.name, trend.effect.joint, trend.alternatives) == ("stiffness_drift", "hip", ())
     assert abs(trend.values[0] + 250.0) < 3.0 * trend.stds[0] < 15.0
     assert abs(trend.effect.time_constant - 20.0) < 3.0 * trend.time_constant_std < 1.5
+
+
+@pytest.mark.scenario
+def test_a_rate_is_that_of_the_start_whenever_in_a_period_it_shows(laboratory):
+    """This spring is bent most in the first half of every period: its stiffness there is that of an earlier time."""
+    planted = [("stiffness_drift", "knee", [60.0], {"time_constant": 27.0})]
+    bench = laboratory.bench(laboratory.record(planted, periods=16, jitter=FrictionJitter.none()))
+    (trend,) = compare_periods(bench, settle(bench, bench.effects).fit).trends
+    assert (trend.effect.name, trend.effect.joint) == ("stiffness_drift", "knee")
+    assert abs(trend.values[0] - 60.0) < 2.0 * trend.stds[0] < 1.0
 
 
 @pytest.mark.scenario

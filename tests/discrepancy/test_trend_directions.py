@@ -9,7 +9,7 @@ from sea_ident.discrepancy import check
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend_directions import steady_rows, with_course
+from sea_ident.discrepancy.trend_directions import PeriodColumns, steady_rows, with_course
 from sea_ident.effects import make_effect
 
 
@@ -94,3 +94,19 @@ def test_a_softer_spring_carries_less_load_in_what_depends_on_it(softening):
     away = np.abs(torque) > 0.01 * np.abs(torque).max()
     np.testing.assert_allclose(rows.motor[away, 0, 0], (motion.deflection[:, 0] + friction)[away], rtol=1e-6, atol=1e-9)
     np.testing.assert_array_equal(rows.link[:, 0, 0], -motion.deflection[:, 0])
+
+
+def test_what_bends_is_seen_when_its_columns_are_large(softening):
+    """In a half of a period in which a spring is hardly bent, its stiffness does not show."""
+    bench, fit = softening
+    columns = PeriodColumns(bench, fit, bench.noise_of_cut(fit))
+    cause = next(c for c in columns.causes(None) if c.name == ("stiffness_drift", "hip"))
+    middle = bench.data.starts + 0.5 * bench.data.period
+    straight, bent = (
+        columns.inside(with_course(replace(cause.effect, time_constant=c), columns.within(cause), middle), middle, None)
+        for c in (1e6, 20.0)
+    )
+    np.testing.assert_allclose(straight, [[1.0]], atol=1e-4)
+    half = np.exp(0.5 * bench.data.period / 20.0)
+    assert 1.0 / half < bent[0, 0] < half
+    assert abs(bent[0, 0] - 1.0) > 0.005
