@@ -26,7 +26,7 @@ from sea_ident.discrepancy.trend_directions import (
 )
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.discrepancy.trend_search import Chosen, Sized, alike, best_trend, find_trends
-from sea_ident.discrepancy.trend_values import course_values
+from sea_ident.discrepancy.trend_values import CourseValues, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.side_by_side import side_by_side
@@ -181,8 +181,8 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters)
     whole = {cause.name: cause for cause in causes}
 
-    def inside(direction: Direction) -> FloatArray:
-        return columns.inside(direction, middle, whole[direction.name].temperature)
+    def inside(direction: Direction, found: CourseValues) -> CourseValues:
+        return found.over(columns.inside(direction, found.values, middle, whole[direction.name].temperature))
 
     held = held_basis(
         [replace(c.direction, columns=columns.within(whole[c.direction.name])[-len(flat) :]) for c in chosen]
@@ -342,13 +342,13 @@ def _trend(
     position: int,
     directions: Sequence[Direction],
     change: _Change,
-    inside: Callable[[Direction], FloatArray],
+    inside: Callable[[Direction, CourseValues], CourseValues],
 ) -> Trend:
     """One of the trends that were chosen, its values beside the others, and what else it could be."""
     own, others = chosen[position], [c for k, c in enumerate(chosen) if k != position]
     direction = own.direction
     beside = [c.direction.course for c in others]
-    values = course_values(numbers, [direction.course, *beside])[0].of_factor(inside(direction))
+    values = inside(direction, course_values(numbers, [direction.course, *beside])[0])
     held = held_basis([c.direction for c in others])
     taken = {c.direction.name for c in chosen}
     alternatives: dict[Name, tuple[Effect, float]] = {}
@@ -366,7 +366,7 @@ def _trend(
     bends = [d for d in directions if d.name == direction.name and d.bent]
     if bends and not direction.bent:
         bent = max(bends, key=lambda d: gain(numbers, d, held)[0])
-        rival = course_values(numbers, [bent.course, *beside])[0].of_factor(inside(bent))
+        rival = inside(bent, course_values(numbers, [bent.course, *beside])[0])
         chance = float(expit(0.5 * (gain(numbers, bent, held)[0] - own.gain - FREE_BEND)))
         stds = _of_either(at_start, stds, _at_start(bent, rival.values), rival.stds, chance)
     return Trend(

@@ -199,17 +199,21 @@ class PeriodColumns:
                 found.append(Cause(effect, columns, own))
         return found
 
-    def inside(self, direction: Direction, middle: FloatArray, temperature: FloatArray | None) -> FloatArray:
-        """(k, k) by what the values of a trend are multiplied where its course is that of the middles of the periods.
+    def inside(
+        self, direction: Direction, values: FloatArray, middle: FloatArray, temperature: FloatArray | None
+    ) -> float:
+        """Times what a trend is that its values come to where its course is that of the middles of the periods [-].
 
-        What bends changes faster in one half of a period than in the other: where its columns are large in the first
+        What bends changes faster in one half of a period than in the other: where its torque is large in the first
         half, it was seen earlier than in the middle. A straight course makes every period differ by as much from its
         middle.
 
         Args:
             direction: the trend in its course.
+            values: (k,) by that course.
             middle: (P,) middles of the periods [s].
-            temperature: (P,) of its joint [degC], None where it was not measured or does not matter.
+            temperature: of its joint in these periods, and perhaps in some before them [degC]; None where it was not
+                measured or does not matter.
         """
         effect, bench, fit = direction.effect, self._bench, self._fit
         if not isinstance(effect, TrendEffect):
@@ -218,15 +222,17 @@ class PeriodColumns:
         time = middle[:, None] + bench.data.period * phase
         own = None
         if temperature is not None:
-            own = interp1d(middle, temperature, fill_value="extrapolate")(time.ravel())
+            own = interp1d(middle, temperature[-len(middle) :], fill_value="extrapolate")(time.ravel())
         change = effect.change(time.ravel(), own).reshape(time.shape)
         course = direction.profile @ change / float(direction.profile @ direction.profile)
         rows = steady_rows(bench, fit, effect)
-        weighted = replace(rows, link=rows.link * course[:, None, None], motor=rows.motor * course[:, None, None])
-        there, middles = (
-            self.flat(bench.spectra_of(part, fit.effects) * fit.scale[:, None]) for part in (weighted, rows)
+        torque = replace(rows, link=(rows.link @ values)[:, :, None], motor=(rows.motor @ values)[:, :, None])
+        weighted = replace(torque, link=torque.link * course[:, None, None], motor=torque.motor * course[:, None, None])
+        seen, taken = (
+            self.flat(bench.spectra_of(part, fit.effects) * fit.scale[:, None])[:, 0] for part in (weighted, torque)
         )
-        return np.asarray(np.linalg.lstsq(middles, there, rcond=None)[0], dtype=np.float64)
+        power, common = float(taken @ taken), float(taken @ seen)
+        return common / power if common > 0.0 else 1.0
 
     def within(self, cause: Cause, space: FloatArray | None = None) -> FloatArray:
         """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""

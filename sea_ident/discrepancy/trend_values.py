@@ -44,10 +44,9 @@ class CourseValues:
     stds: FloatArray
     bend_std: float = 0.0
 
-    def of_factor(self, factor: FloatArray) -> "CourseValues":
-        """The values of which these are (k, k) the multiple: see `PeriodColumns.inside`."""
-        values = np.asarray(np.linalg.solve(factor, self.values), dtype=np.float64)
-        return replace(self, values=values, stds=self.stds / np.abs(np.diag(factor)))
+    def over(self, factor: float) -> "CourseValues":
+        """The values of which these are so many times: see `PeriodColumns.inside`."""
+        return replace(self, values=self.values / factor, stds=self.stds / factor)
 
 
 def time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]:

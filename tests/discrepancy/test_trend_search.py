@@ -161,7 +161,7 @@ def test_a_rate_is_as_sure_as_is_said_whether_its_course_bends_or_not(time_const
         chosen = find_trends(flat, directions, MIDDLE, FLOOR, 2, 1e-3, lambda d, v: True)
         # of which nothing is known within a period
         trends = [
-            _trend(flat, chosen, k, directions, lambda d, v: 0.1, lambda d: np.eye(1)) for k in range(len(chosen))
+            _trend(flat, chosen, k, directions, lambda d, v: 0.1, lambda d, found: found) for k in range(len(chosen))
         ]
         scores.extend((t.values[0] - rate) / t.stds[0] for t in trends)
     assert len(scores) > 60
