@@ -17,7 +17,7 @@ from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, SMALLEST_SHARE, ne
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import MOST_EFFECTS
-from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle_again
+from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.stribeck_friction import StribeckFriction
@@ -86,7 +86,6 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
         now = settle_again(near, settle_again(near, step[0]).fit)
     if not added:
         return bench, replace(confirmed, beside=(near, now))
-    now = anchored_in_itself(near, now)
     start = settle_again(near, before.start.fit)
     found = tuple(scan(near, now.fit, now.noise))
     selection = replace(

@@ -76,7 +76,7 @@ def named_effect(
         for i, more, shown in zip(own, by_rest, seen, strict=True)
         if shown
     ]
-    at_rest = bool(len(values)) and bool(np.all(by_rest >= np.abs(values)))
+    at_rest = bool(len(values)) and bool(np.all(by_rest > 0.0))
     parameters.extend(_shape_parameters(bench, fit, position, stds, at_rest))
     return MissingEffect(
         effect=effect.name,

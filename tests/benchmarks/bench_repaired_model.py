@@ -61,21 +61,18 @@ def main() -> None:
             for which, one in (("before", model), ("after", found.model)):
                 for name, value, std, truth in told(one):
                     seen[which, name].append((value, std, truth))
+    ratios: dict[str, list[float]] = defaultdict(list)
     for (which, name), values in seen.items():
         estimates, stds, truths = np.array(values).T
         scatter = float(np.std(estimates, ddof=1))
+        ratios[which].append(float(np.mean(stds)) / scatter)
         error = float(np.mean(estimates - truths)) / scatter
         print(
-            f"{which:7}{name:24} told {np.mean(stds):8.3g}  scatter {scatter:8.3g}  ratio "
-            f"{np.mean(stds) / scatter:5.2f}  mean error {error:+5.2f} times the scatter"
+            f"{which:7}{name:24} told {np.mean(stds):8.3g}  scatter {scatter:8.3g}  ratio {ratios[which][-1]:5.2f}  "
+            f"mean error {error:+5.2f} times the scatter"
         )
-    for which in ("before", "after"):
-        ratios = []
-        for (when, _), values in seen.items():
-            estimates, stds, _ = np.array(values).T
-            if when == which:
-                ratios.append(np.mean(stds) / np.std(estimates, ddof=1))
-        print(f"{which:7}told over scatter {min(ratios):.2f} to {max(ratios):.2f}, median {np.median(ratios):.2f}")
+    for which, own in ratios.items():
+        print(f"{which:7}told over scatter {min(own):.2f} to {max(own):.2f}, median {np.median(own):.2f}")
 
 
 if __name__ == "__main__":

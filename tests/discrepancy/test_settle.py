@@ -2,6 +2,7 @@
 
 import pytest
 
+from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import FAR, Settled, anchored_in_itself, settle
 from sea_ident.effects import make_effect
 
@@ -38,6 +39,16 @@ def test_effects_are_followed_until_they_stand_where_the_model_puts_them(saturat
     saturation = there.fit.effects[-1]
     assert saturation.coefficient == pytest.approx(there.fit.parameters["knee.torque_saturation"], rel=1e-2)
     assert anchored_in_itself(bench, there) is there
+
+
+@pytest.mark.scenario
+def test_a_search_ends_with_effects_that_stand(saturated):
+    """It goes on to the next effect, and stops where there is none, before they do."""
+    bench, start = saturated
+    found = search(bench, bench.effects, start=start)
+    assert [(e.name, e.joint) for e in found.effects] == [("torque_saturation", "knee")]
+    assert abs(off(found.final)) < 2.5
+    assert anchored_in_itself(bench, found.final) is found.final
 
 
 def test_what_depends_on_nothing_stays_as_it_is(nothing_missing):
