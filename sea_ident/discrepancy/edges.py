@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray, IntArray
 from sea_ident.discrepancy.bench import Bench
@@ -44,6 +45,9 @@ COARSE_STEP = 1.0 / 4.0
 
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
+
+AT_ONCE = 0.9
+"""Share of the samples in which either of two pushes comes from which on they come at once [-]."""
 
 ABSORBED = 1e-6
 """A component of a push of which the model leaves less than this share of its power is not looked at."""
@@ -105,6 +109,31 @@ def at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
     effects = [centred if k == position else effect for k, effect in enumerate(fit.effects)]
     centre = bench.fit(effects, noise, start=fit.parameters, tangents=False)
     return _sharpened(bench, centre, noise, position, 1.0, FINEST_STEP)
+
+
+def without_another(bench: Bench, fit: Fit, noise: NoiseFloor, push: ExternalForce, first: int) -> Fit:
+    """A fit without a push, where those from a position on that come when it did may meet their links elsewhere.
+
+    Two pushes at once on the centres of mass of two links stand in for one that is a little off that of its own.
+
+    Args:
+        bench: the recording.
+        fit: without it.
+        noise: noise floor.
+        push: what was taken out.
+        first: position from which on effects were added.
+    """
+    time = bench.data.motion.time
+    for position in range(first, len(fit.effects)):
+        other = fit.effects[position]
+        if isinstance(other, ExternalForce) and _at_once(push.pushes(time), other.pushes(time)):
+            fit = min(fit, _moved_point(bench, fit, noise, position), key=lambda each: each.statistic)
+    return fit
+
+
+def _at_once(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
+    """Whether two pushes come in mostly the same samples (N,)."""
+    return int(np.sum(one & other)) > AT_ONCE * max(int(np.sum(one)), int(np.sum(other)))
 
 
 def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:

@@ -9,7 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key
-from sea_ident.discrepancy.edges import sharpened
+from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.judge import at_a_bound, is_push, own_torque, significance, torque_change, torque_changes
@@ -226,6 +226,7 @@ def _eliminate(
         if worst[0].p_value <= FAMILY_LEVEL:
             break
         now = settle_again(bench, bench.again(worst[0].left, noise))
+        now = _formed(bench, now) if is_push(fit.effects[worst[1]]) else now
         del added[worst[1] - first]
     return now, added
 
@@ -271,23 +272,25 @@ class _Elimination:
 
     def __call__(self, position: int) -> _Without:
         """The model without the effect at a position."""
-        bench, fit, noise = self.bench, self.now.fit, self.now.noise
-        others = [e for k, e in enumerate(fit.effects) if k != position]
-        without = bench.refine(others, noise, start=fit.parameters, only=len(bench.effects))
+        bench, fit, noise, first = self.bench, self.now.fit, self.now.noise, len(self.bench.effects)
+        effect, others = fit.effects[position], [e for k, e in enumerate(fit.effects) if k != position]
+        without = bench.refine(others, noise, start=fit.parameters, only=first)
+        if is_push(effect):
+            without = without_another(bench, without, noise, effect, first)
         loss = without.statistic - fit.statistic
-        columns = max(len(fit.effects[position].columns(bench.robot)), 1)
+        columns = max(len(effect.columns(bench.robot)), 1)
         visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
         # as where it was added: what the model bends by without it says nothing of its size
         needed = min(visible, 2.0 * own) >= SMALLEST_SHARE and physical(bench, fit, position)
         # nor what beside the others ended at the end of its range
-        needed = needed and not at_a_bound(fit.effects[position])
-        if is_push(fit.effects[position]):
+        needed = needed and not at_a_bound(effect)
+        if is_push(effect):
             needed = needed and own > BEYOND_FORM * self.nameless
             # a push comes and goes: nothing but another push can cancel it
             needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
         needed = needed and not bends_another(bench, fit, position)
         p_value = significance(loss, columns, self.tests, without, noise) if needed else 1.0
-        added = range(len(bench.effects), len(others))
+        added = range(first, len(others))
         sound = p_value <= FAMILY_LEVEL or all(physical(bench, without, k) for k in added)
         return _Without(p_value, without.statistic, without.solution, sound)
 
