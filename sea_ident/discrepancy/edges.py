@@ -21,8 +21,11 @@ from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 INSTANTS = 160
 """Instants in a period between which every push is compared."""
 
-FINEST_STEP = 1.0 / 16.0
-"""Last step by which edges are moved, in samples."""
+FINE_STEP = 1.0 / 8.0
+"""Step by which edges are moved within a sample or beyond, in samples, ..."""
+
+FINEST_STEP = 1.0 / 64.0
+"""... and the last one, within one such step: between samples the statistic has one minimum."""
 
 BESIDE = 1e-3
 """Distance from the centre of mass, along every axis of the link, from which its point begins to move [m]."""
@@ -89,14 +92,14 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
         fit = _moved_point(bench, fit, noise, position, FAR_ABOVE * beat)
         if fit.statistic > FAR_ABOVE * beat:
             return fit
-    return _with_point(bench, _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP), noise, position)
+    return _with_point(bench, _finely_sharpened(bench, fit, noise, position), noise, position)
 
 
 def sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, first: int) -> Fit:
     """A fit with the edges of all pushes from a position on moved a little: what was found since bent them before."""
     for position in range(first, len(fit.effects)):
         if isinstance(fit.effects[position], ExternalForce):
-            fit = _with_point(bench, _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP), noise, position)
+            fit = _with_point(bench, _finely_sharpened(bench, fit, noise, position), noise, position)
     return fit
 
 
@@ -108,7 +111,7 @@ def at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
         return fit
     effects = [centred if k == position else effect for k, effect in enumerate(fit.effects)]
     centre = bench.fit(effects, noise, start=fit.parameters, tangents=False)
-    return _sharpened(bench, centre, noise, position, 1.0, FINEST_STEP)
+    return _finely_sharpened(bench, centre, noise, position)
 
 
 def without_another(bench: Bench, fit: Fit, noise: NoiseFloor, push: ExternalForce, first: int) -> Fit:
@@ -148,7 +151,7 @@ def _with_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit
         fit = _moved_point(bench, fit, noise, position)
         if before - fit.statistic < ENOUGH * fit.excess:
             break
-        fit = _sharpened(bench, fit, noise, position, 1.0, FINEST_STEP)
+        fit = _finely_sharpened(bench, fit, noise, position)
     price = penalty(fit.effects[position], bench) - penalty(centre.effects[position], bench)
     if centre.statistic < fit.statistic + price * fit.unit:
         fit = centre
@@ -161,6 +164,12 @@ def _moved_point(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, beat:
     if not any(getattr(push, name) for name in POINT):
         effects[position] = replace(push, **dict.fromkeys(POINT, BESIDE))  # type: ignore[arg-type]
     return bench.refine(effects, noise, start=fit.parameters, only=position, beat=beat)
+
+
+def _finely_sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A fit with the edges of a push where they fit best, to a small part of a sample."""
+    fit = _sharpened(bench, fit, noise, position, 1.0, FINE_STEP)
+    return _sharpened(bench, fit, noise, position, FINE_STEP, FINEST_STEP)
 
 
 def _sharpened(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, reach: float, step: float) -> Fit:

@@ -80,10 +80,13 @@ class ExternalForce(Effect):
         return Contribution(link, np.broadcast_to(0.0, link.shape))
 
     def share_of(self, time: FloatArray) -> FloatArray:
-        """(N,) share of the time around each of evenly spaced samples (N,) [s] in which it pushes [-]."""
+        """(N,) share of the time around each of evenly spaced samples (N,) [s] in which it pushes [-].
+
+        Of periods one after the other, each with the time that it has by itself, too.
+        """
         if len(time) < 2:
             return self.pushes(time).astype(np.float64)
-        half = 0.5 * float(time[-1] - time[0]) / (len(time) - 1)
+        half = 0.5 * float(np.median(np.diff(time)))
         begin, end = time - half, time + half
         if not self.period > 0.0:  # nothing is known of what was before and after
             begin, end = np.maximum(begin, time[0]), np.minimum(end, time[-1])

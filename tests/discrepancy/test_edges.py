@@ -11,8 +11,9 @@ from sea_ident.discrepancy.decide import simplest_first
 from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import Selection, search
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.search import Selection, _eliminate, search
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
+from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
 from sea_ident.effects.external_force import POINT
 
@@ -72,6 +73,26 @@ def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
     assert (x, z) == pytest.approx((4.0, 2.0), abs=0.3)
     turned = own.point_z * x - own.point_x * z  # the foot is nearly level throughout
     assert turned == pytest.approx(point["point_z"] * 4.0 - point["point_x"] * 2.0, abs=0.05)
+
+
+@pytest.mark.scenario
+def test_two_pushes_at_once_make_room_for_one_off_the_centre_of_mass(laboratory):
+    """What one on the centre of mass leaves is taken for a push on the next link, at the same instants."""
+    force, times = np.array([6.0, 0.0, -19.0]), {"start": 1.3364, "stop": 1.6702, "period": PERIOD}
+    push = make_effect("external_force", "knee", point_x=0.006, point_z=-0.004, **times)
+    bench = laboratory.bench(laboratory.record([(push, force)], periods=10))
+    now = settle(bench, bench.effects)
+    two = [make_effect("external_force", joint, **times) for joint in ("knee", "hip")]
+    begun = bench.fit((*now.fit.effects, *two), now.noise, start=now.fit.parameters)
+    now, p_values = _eliminate(bench, settle_again(bench, begun), [1e-9, 1e-9], 1000)
+    assert len(p_values) == 1
+    own, stds = now.fit.effects[-1], uncertainties(bench, now)
+    assert (own.name, own.joint) == ("external_force", "knee")
+    assert (own.point_x, own.point_z) == pytest.approx((0.006, -0.004), abs=0.004)
+    for axis, value in zip("xz", force[[0, 2]], strict=True):
+        name = f"knee.external_force_{axis}"
+        std = stds[[column.name for column in now.fit.columns].index(name)]
+        assert now.fit.parameters[name] == pytest.approx(value, abs=3.0 * std)
 
 
 @pytest.mark.scenario

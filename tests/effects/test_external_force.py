@@ -55,3 +55,12 @@ def test_it_pushes_for_as_long_as_it_does_between_samples_too(start, stop):
     if stop > start:
         assert np.sum(share * time) / np.sum(share) == pytest.approx(0.5 * (start + stop), abs=2e-3)
     np.testing.assert_allclose(make_effect("external_force", "knee").share_of(time), 1.0)
+
+
+@pytest.mark.parametrize("count", [2, 7])
+def test_periods_one_after_the_other_have_the_shares_of_each(count):
+    """Whichever are looked at together: what would differ between halves of a recording would be a trend in it."""
+    period = 4.0
+    time = np.arange(400) * period / 400
+    effect = make_effect("external_force", "knee", start=1.2345, stop=1.5678, period=period)
+    np.testing.assert_allclose(effect.share_of(np.tile(time, count)), np.tile(effect.share_of(time), count))
