@@ -21,6 +21,7 @@ from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.drifting import drifting
+from sea_ident.discrepancy.edges import stays_on_the_centre
 from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut, held_out
@@ -152,7 +153,7 @@ def diagnose(
     after = (as_identified, selection.final.fit)
     before = (processed, selection.start.fit) if selection.added else None
     repaired = repair(model, after, before, held, recording, processed, controller)
-    spoken = (*_sticking(bench, selection), *_at_rest(selection, held))
+    spoken = (*_sticking(bench, selection), *_at_rest(selection, held), *_on_centres(bench, selection))
     of_springs = (*doubts_of_springs(robot, model.springs), *circular_springs(robot, recording))
     of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
     basic_notes = (*of_sensors, *of_springs, *(() if basic is None else basic.warnings))
@@ -321,6 +322,13 @@ def _at_rest(selection: Selection, held: HeldOut | None) -> tuple[str, ...]:
     """Where the dry friction of springs rests, in words."""
     constants = (selection.effects[k] for k in resting(selection, held))
     return tuple(words.at_rest(effect.required_joint) for effect in constants if isinstance(effect, SpringOffset))
+
+
+def _on_centres(bench: Bench, selection: Selection) -> tuple[str, ...]:
+    """Which pushes are told as if on the centre of mass, in words."""
+    fit, count = selection.final.fit, len(selection.final.fit.effects)
+    told = [k for k in range(count - selection.added, count) if stays_on_the_centre(bench, fit, k)]
+    return tuple(words.on_the_centre(fit.effects[k].joint or "") for k in told)
 
 
 def _in_steps(bench: Bench) -> bool:

@@ -114,6 +114,15 @@ def at_centre(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
     return _finely_sharpened(bench, centre, noise, position)
 
 
+def stays_on_the_centre(bench: Bench, fit: Fit, position: int) -> bool:
+    """Whether an effect is a push on the centre of mass of its link, though another point would make a difference."""
+    push = fit.effects[position]
+    if not isinstance(push, ExternalForce) or any(getattr(push, name) for name in POINT):
+        return False
+    beside = replace(push, **dict.fromkeys(POINT, BESIDE))  # type: ignore[arg-type]
+    return not np.array_equal(bench.column_spectra(push, fit.effects), bench.column_spectra(beside, fit.effects))
+
+
 def without_another(bench: Bench, fit: Fit, noise: NoiseFloor, push: ExternalForce, first: int) -> Fit:
     """A fit without a push, where those from a position on that come when it did may meet their links elsewhere.
 

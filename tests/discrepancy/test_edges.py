@@ -1,6 +1,7 @@
 """A push is found to the sample, from wherever the search for its edges begins."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,14 +9,16 @@ import pytest
 from sea_ident.discrepancy import edges
 from sea_ident.discrepancy.assess import rivals
 from sea_ident.discrepancy.decide import simplest_first
-from sea_ident.discrepancy.edges import _best_window, with_sharp_edges
+from sea_ident.discrepancy.edges import _best_window, at_centre, stays_on_the_centre, with_sharp_edges
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, _eliminate, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.uncertainty import uncertainties
-from sea_ident.effects import make_effect
+from sea_ident.effects import State, make_effect
 from sea_ident.effects.external_force import POINT
+from sea_ident.motion import Motion
+from sea_ident.robot import load_robot
 
 PERIOD = 5.0
 START, STOP = 4.13, 0.62
@@ -65,6 +68,7 @@ def test_a_push_away_from_the_centre_of_mass_is_one_push(laboratory):
     bench = laboratory.bench(laboratory.record([(push, force)]))
     found = search(bench, bench.effects)
     assert [(e.name, e.joint) for e in found.effects] == [("external_force", "ankle")]
+    assert not stays_on_the_centre(bench, found.final.fit, -1)
     own, fit, noise = found.effects[0], found.final.fit, found.final.noise
     # it explains as much as the truth does
     model = [push if effect is own else effect for effect in fit.effects]
@@ -142,6 +146,24 @@ def test_a_push_on_another_link_is_compared_when_its_edges_are_known(pushed_thig
     beat = shank.fit.statistic + EQUALLY_GOOD
     thigh = refitted(bench, before, candidates["hip"], (), shank.noise, shank.fit.parameters, beat)
     assert thigh.statistic < beat
+
+
+@pytest.mark.scenario
+def test_how_large_a_push_on_a_centre_of_mass_is_depends_on_where_it_is(pushed_thigh):
+    bench, now, shank, _ = pushed_thigh
+    assert stays_on_the_centre(bench, at_centre(bench, shank.fit, shank.noise, len(now.fit.effects)), -1)
+    assert not any(stays_on_the_centre(bench, now.fit, k) for k in range(len(now.fit.effects)))
+
+
+@pytest.mark.filterwarnings("ignore:emps")
+@pytest.mark.parametrize(("name", "matters"), [("exo_leg", True), ("emps", False)])
+def test_where_a_link_is_pushed_makes_no_difference_where_it_only_slides(name, matters):
+    robot = load_robot(name)
+    q = np.linspace(-0.1, 0.1, 20)[:, None] * np.ones(robot.n)
+    push = make_effect("external_force", robot.joint_names[0])
+    motion = Motion(q[:, 0], *[q] * 6)
+    bench = SimpleNamespace(column_spectra=lambda effect, _: effect.evaluate(State(robot, motion)).link)
+    assert stays_on_the_centre(bench, SimpleNamespace(effects=(push,)), 0) is matters
 
 
 @pytest.mark.scenario
