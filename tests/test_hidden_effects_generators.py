@@ -31,7 +31,8 @@ from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_muj
 from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
-from tests.benchmarks.hidden_effects.sizes import SIZES, WAVES, size_errors
+from tests.benchmarks.hidden_effects.sizes import OTHERWISE_BUILT, size_errors
+from tests.benchmarks.hidden_effects.sizes import true_parameters as told_parameters
 from tests.benchmarks.hidden_effects.trajectories import draw_trajectory
 
 SMOOTHING = 0.02
@@ -195,21 +196,23 @@ def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.En
     assert after < LEFT_OVER.get(entry.effect, 0.03) * before
 
 
-@pytest.mark.parametrize("effect", [*SIZES, *WAVES, "spring_hysteresis", "torque_constant", "torque_delay"])
-def test_the_project_plants_what_the_score_asks_for(effect: str, leg: gap.Gauge) -> None:
-    """The sizes of a truth mean the same in both engines."""
+@pytest.mark.parametrize("effect", [e.effect for e in catalogue.LIBRARY if e.effect not in OTHERWISE_BUILT])
+def test_every_size_of_the_library_is_scored(effect: str, leg: gap.Gauge) -> None:
+    """What the project would plant has no error, by the names that a diagnosis tells; and each number counts."""
     entry, robot, joint = catalogue.ENTRIES[(effect, "library")], leg.truth.robot, 1
     _, size, shape = entry.draw(catalogue.Place(leg, joint, generator(9, 12)))
-    planted = Planted(
-        effect, robot.joint_names[joint], "library", -size if effect == "torque_constant" else size, shape
-    )
-    (there,) = planted_effects(planted, leg.truth, SMOOTHING, leg.series.period, 1)
+    planted = Planted(effect, None if entry.whole else robot.joint_names[joint], "library", size, shape)
+    case = replace(draw_case(1, "none", 0), robot="exo_leg", friction_smoothing=SMOOTHING, engine="project")
+    (there, *_) = planted_effects(planted, leg.truth, SMOOTHING, case.period, case.periods)
     told = {column.name: value for column, value in zip(there.effect.columns(robot), there.values, strict=True)}
     told |= {there.effect.parameter_name(s.name): getattr(there.effect, s.name) for s in there.effect.ranges}
-    entries = [{"name": name, "value": float(value), "std": 1.0} for name, value in told.items()]
-    errors = size_errors(planted, {"parameters": entries})
+    told |= {name: v for name, v in told_parameters(planted, case, leg.truth).items() if "_point_" in name}
+    entries = [{"name": name, "value": float(value), "std": 0.5} for name, value in told.items()]
+    errors = size_errors(planted, {"parameters": entries}, case, leg.truth)
     assert errors
     assert errors == pytest.approx(np.zeros(len(errors)), abs=1e-12)
+    off = [{**each, "value": each["value"] + 1.0} for each in entries]
+    assert size_errors(planted, {"parameters": off}, case, leg.truth) == pytest.approx(np.full(len(errors), 2.0))
 
 
 @pytest.mark.parametrize("form", ["library", "lugre"])

@@ -13,10 +13,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.diagnose_case import without_effects
-from tests.benchmarks.hidden_effects.draw import draw_case
+from tests.benchmarks.hidden_effects.draw import draw_case, truth_of
 from tests.benchmarks.hidden_effects.generate import case_folder, generate, truth_file
 from tests.benchmarks.hidden_effects.scoring import Score, score_case
-from tests.benchmarks.hidden_effects.sizes import size_errors
+from tests.benchmarks.hidden_effects.sizes import size_errors, true_parameters
 from tests.benchmarks.hidden_effects.table import EASILY_TAKEN_FOR, either_way, lines_of, wilson, write_report
 
 RIPPLE = Planted("torque_ripple", "knee", "library", 0.1, {"order": 5.0, "phase": 0.3}, gap=0.02, torque_share=0.02)
@@ -175,18 +175,45 @@ def test_what_is_like_another_is_so_either_way() -> None:
 
 
 def test_sizes_are_compared_in_standard_deviations_of_the_diagnosis() -> None:
-    def entry(**told: tuple[float, float]) -> dict:
-        return {"parameters": [{"name": f"knee.{name}", "value": v, "std": s} for name, (v, s) in told.items()]}
+    case = draw_case(1, "none", 0)
+    truth = truth_of(case)
 
-    ripple = entry(torque_ripple_sine=(0.1, 0.01), torque_ripple_cosine=(0.0, 0.01), torque_ripple_order=(5.0, 0.0))
+    def errors(planted: Planted, **told: tuple[float, float]) -> list[float]:
+        parameters = [{"name": f"knee.{name}", "value": v, "std": s} for name, (v, s) in told.items()]
+        return size_errors(planted, {"parameters": parameters}, case, truth)
+
+    ripple = {"torque_ripple_sine": (0.1, 0.01), "torque_ripple_cosine": (0.0, 0.01), "torque_ripple_order": (5.0, 0.0)}
     expected = [(0.1 - 0.1 * np.cos(0.3)) / 0.01, -0.1 * np.sin(0.3) / 0.01]
-    assert size_errors(RIPPLE, ripple) == pytest.approx(expected)  # the order was held
-    assert size_errors(replace(RIPPLE, form="lugre"), ripple) == []
+    assert errors(RIPPLE, **ripple) == pytest.approx(expected)  # the order was held
+    assert errors(replace(RIPPLE, form="lugre"), **ripple) == []
     curve = replace(RIPPLE, effect="stribeck_friction", size=1.0, shape={"speed": 0.05, "exponent": 2.0})
-    told = entry(stribeck_friction=(1.1, 0.1), stribeck_friction_speed=(0.04, 0.01),
-                 stribeck_friction_exponent=(2.0, 0.5))  # fmt: skip
-    assert size_errors(curve, told) == pytest.approx([1.0, -1.0, 0.0])
+    told = {"": (1.1, 0.1), "_speed": (0.04, 0.01), "_exponent": (2.0, 0.5)}
+    assert errors(curve, **{f"stribeck_friction{k}": v for k, v in told.items()}) == pytest.approx([1.0, -1.0, 0.0])
     late = replace(RIPPLE, effect="torque_delay", size=0.01, shape={})
-    assert size_errors(late, entry(torque_delay_delay=(-0.012, 0.001))) == pytest.approx([-2.0])
+    assert errors(late, torque_delay_delay=(-0.012, 0.001)) == pytest.approx([-2.0])
     gain = replace(RIPPLE, effect="torque_constant", size=0.25, shape={})
-    assert size_errors(gain, entry(torque_constant=(-0.2, 0.01))) == pytest.approx([0.0])
+    assert errors(gain, torque_constant=(-0.2, 0.01)) == pytest.approx([0.0])
+
+
+def test_how_large_a_push_is_counts_where_its_point_is_told() -> None:
+    case = draw_case(1, "none", 0)
+    truth, where = truth_of(case), {"x": 0.6, "y": 0.0, "z": -0.8, "begin": 0.2, "end": 0.3}
+    push = replace(RIPPLE, effect="external_force", size=5.0, shape=where)
+    away = true_parameters(push, case, truth)["knee.external_force_point_x"]
+    assert 1e-4 < abs(away) < 0.02  # of the true centre of mass from the described one
+    for std, expected in ((0.0, []), (0.01, [2.0, 1.0])):
+        told = (("x", 3.2, 0.1), ("point_x", away + 0.01, std))
+        parameters = [{"name": f"knee.external_force_{n}", "value": v, "std": s} for n, v, s in told]
+        assert size_errors(push, {"parameters": parameters}, case, truth) == pytest.approx(expected)
+
+
+def test_a_coupling_has_the_friction_of_its_motor() -> None:
+    """In the engine whose motors have it; the project's plants that of the description."""
+    truth = truth_of(draw_case(1, "none", 0))
+    coupled = replace(RIPPLE, effect="transmission_coupling", size=-0.1, shape={"other": 2.0})
+    name = "knee.transmission_coupling_coulomb_from_ankle"
+    for engine in ("mujoco", "project"):
+        known = true_parameters(coupled, replace(draw_case(1, "none", 0), engine=engine), truth)
+        same = known[name] == pytest.approx(-0.1 * truth.coulomb[1])
+        assert bool(same) is (engine == "mujoco")
+        assert not any("inertia" in each or "smoothing" in each for each in known)

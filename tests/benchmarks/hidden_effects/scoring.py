@@ -8,6 +8,7 @@ from typing import Any
 from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.catalogue import ENTRIES
 from tests.benchmarks.hidden_effects.diagnose_case import RESULT
+from tests.benchmarks.hidden_effects.draw import truth_of
 from tests.benchmarks.hidden_effects.generate import case_folder
 from tests.benchmarks.hidden_effects.plants import nominal_robot
 from tests.benchmarks.hidden_effects.sizes import size_errors
@@ -103,13 +104,13 @@ class Score:
 
     def size_errors(self) -> list[float]:
         """Errors of sizes of what is named rightly, in standard deviations of the diagnosis [-]."""
-        entries = self.record.get("missing", [])
+        entries, truth = self.record.get("missing", []), truth_of(self.case)
         return [
             error
             for planted in self.case.planted
             for entry in entries
             if (entry["effect"], entry.get("joint")) == planted.name
-            for error in size_errors(planted, entry)
+            for error in size_errors(planted, entry, self.case, truth)
         ]
 
     @property

@@ -5,57 +5,75 @@ from typing import Any
 
 import numpy as np
 
-from tests.benchmarks.hidden_effects.case import Planted
+from sea_ident.robot import Robot
+from tests.benchmarks.hidden_effects.case import Case, FloatArray, Planted
+from tests.benchmarks.hidden_effects.plants import Truth, nominal_robot
+from tests.benchmarks.hidden_effects.project_engine import planted_effects
 
-SIZES = {
-    "stribeck_friction": ("", "speed", "exponent"),
-    "nonlinear_viscous_friction": ("", "exponent"),
-    "load_dependent_friction": ("",),
-    "directional_efficiency": ("",),
-    "torque_offset": ("",),
-    "torque_saturation": ("",),
-    "spring_offset": ("",),
-    "parallel_spring": ("stiffness",),
-    "link_friction": ("coulomb",),
-    "backlash": ("half_width",),
-    "presliding_friction": ("displacement",),
-    "encoder_offset": ("offset",),
-    "position_delay": ("delay",),
+OTHERWISE_BUILT = ("link_flexibility",)
+"""Effects that the other engine has in another form: there what turns with the encoder has an inertia of its own."""
+
+NOT_OF_THE_EFFECT = {
+    "presliding_friction": ("",),
+    "backlash": ("", "_cubic"),
+    "transmission_coupling": ("_inertia",),
 }
-"""Parameters of effects that are the size of the truth, and then those of its shape, by the name after the effect's."""
+"""Parameters that are friction, stiffness or inertia of the base model, by what follows the name of the effect."""
 
-WAVES = ("torque_ripple", "position_dependent_friction", "encoder_eccentricity")
-"""Effects that are the sine and the cosine of the truth's size at its phase."""
+HOW_IT_TURNS = ("_smoothing", "_softness")
+"""Shapes of how friction turns over, or play ends: each engine has its own form."""
 
 
-def size_errors(planted: Planted, entry: Mapping[str, Any]) -> list[float]:
+def size_errors(planted: Planted, entry: Mapping[str, Any], case: Case, truth: Truth) -> list[float]:
     """Errors over standard deviations [-] of what an entry of `missing` says of an effect that it names rightly.
 
     Args:
         planted: the truth.
         entry: with its parameters.
+        case: that it was planted in.
+        truth: the base model.
 
     Returns:
         One for every parameter that is comparable and was not held; none where the form of the truth is another.
     """
-    if planted.form != "library":
+    if planted.form != "library" or planted.effect in OTHERWISE_BUILT:
         return []
-    prefix = f"{planted.joint}.{planted.effect}"
-    parameters = entry.get("parameters", ())
-    told = {p["name"].removeprefix(prefix).removeprefix("_"): (p["value"], p["std"]) for p in parameters}
-    truth = dict(zip(SIZES.get(planted.effect, ()), (planted.size, *planted.shape.values()), strict=False))
-    if planted.effect in WAVES:
-        phase = planted.shape["phase"]
-        truth = {"sine": planted.size * np.cos(phase), "cosine": planted.size * np.sin(phase)}
-        truth |= {"order": planted.shape["order"]} if "order" in planted.shape else {}
-    if planted.effect == "spring_hysteresis":  # of two elements that share its force
-        truth = {"narrow": 0.5 * planted.size, "wide": 0.5 * planted.size, "slip": planted.shape["width"]}
-    if planted.effect == "torque_constant":
-        truth = {"": 1.0 / (1.0 + planted.size) - 1.0}
-    if planted.effect == "torque_delay":  # a measured torque that is late is what the model's comes before
-        truth = {"delay": -planted.size}
-    return [
-        float((told[name][0] - value) / told[name][1])
-        for name, value in truth.items()
-        if name in told and told[name][1] > 0.0
-    ]
+    told = {p["name"]: (float(p["value"]), float(p["std"])) for p in entry.get("parameters", ())}
+    free = {name for name, (_, std) in told.items() if std > 0.0}
+    if planted.effect == "external_force" and not any("_point_" in name for name in free):
+        return []  # on a point that is only assumed, a force is as large as that is far from the joint
+    known = true_parameters(planted, case, truth)
+    return [(told[name][0] - value) / told[name][1] for name, value in known.items() if name in free]
+
+
+def true_parameters(planted: Planted, case: Case, truth: Truth) -> dict[str, float]:
+    """Parameters that the library would tell of a planted effect, by their names.
+
+    Args:
+        planted: the effect, in the library's form.
+        case: that it was planted in.
+        truth: the base model.
+    """
+    robot = truth.robot
+    (there, *_) = planted_effects(planted, truth, case.friction_smoothing, case.period, case.periods)
+    effect, stem = there.effect, there.effect.parameter_name()
+    known = {column.name: float(value) for column, value in zip(effect.columns(robot), there.values, strict=True)}
+    known |= {effect.parameter_name(shape.name): float(getattr(effect, shape.name)) for shape in effect.ranges}
+    if planted.effect == "external_force":
+        # it meets the link at its true centre of mass, and is told from where the description has it
+        away = _centre(robot, planted.joint) - _centre(nominal_robot(case.robot), planted.joint)
+        known |= {f"{stem}_point_{axis}": float(distance) for axis, distance in zip("xyz", away, strict=True)}
+    if planted.effect == "transmission_coupling" and case.engine == "mujoco":
+        # there with the friction that the motor has, not with that of its description
+        i, other = robot.index(str(planted.joint)), robot.joint_names[int(planted.shape["other"])]
+        for kind, friction in (("viscous", truth.viscous), ("coulomb", truth.coulomb)):
+            known[f"{stem}_{kind}_from_{other}"] = planted.size * float(friction[i])
+    left_out = {f"{stem}{label}" for label in (*HOW_IT_TURNS, *NOT_OF_THE_EFFECT.get(planted.effect, ()))}
+    return {name: value for name, value in known.items() if name.partition("_from_")[0] not in left_out}
+
+
+def _centre(robot: Robot, joint: str | None) -> FloatArray:
+    """(3,) centre of mass of the link that a joint moves [m]."""
+    model = robot.extended_model
+    body = next(int(k) for k in robot.body_indices if model.names[int(k)] == joint)
+    return np.array(model.inertias[body].lever)
