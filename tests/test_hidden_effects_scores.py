@@ -120,7 +120,8 @@ def test_the_table_tells_how_long_diagnoses_take(tmp_path: Path) -> None:
     scores = [scored(tmp_path, (RIPPLE,), said(("torque_ripple", "knee"), seconds=s), index=k)
               for k, s in enumerate(told)]  # fmt: skip
     failed = scored(tmp_path, (RIPPLE,), {"error": "broken"}, index=20)  # has no seconds
-    other = replace(scores[0], case=replace(scores[0].case, robot="baxter"), seconds=50.0)
+    case = replace(scores[0].case, robot="baxter", planted=(replace(RIPPLE, joint="left_e0"),))
+    other = replace(scores[0], case=case, seconds=50.0)
     lines = {line.what.removeprefix("seconds of a diagnosis, "): line for line in lines_of([*scores, failed, other])}
     figures = {what: (lines[f"exo_leg, {what}"].value, lines[f"exo_leg, {what}"].met) for what in (
         "median", "90th percentile", "largest")}  # fmt: skip
