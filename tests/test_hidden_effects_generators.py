@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 pytest.importorskip("mujoco", reason="the independent engine of the benchmark is MuJoCo")
@@ -27,9 +28,10 @@ from sea_ident.regressor import build_regressor
 from tests.benchmarks.hidden_effects import catalogue, forms, gap, sensors
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case
+from tests.benchmarks.hidden_effects.drawn_robots import MOST_JOINTS, drawn_name, drawn_robot
 from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
 from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
-from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
+from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth, nominal_robot, nominal_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
 from tests.benchmarks.hidden_effects.sizes import OTHERWISE_BUILT, size_errors
 from tests.benchmarks.hidden_effects.sizes import true_parameters as told_parameters
@@ -356,3 +358,18 @@ def test_another_joint_is_one_of_the_same_chain() -> None:
     others = {name: names[catalogue.Place(torso, k, rng).other] for k, name in enumerate(names)}
     assert others == {"waist": "r_shoulder", "l_shoulder": "l_elbow", "l_elbow": "l_shoulder",
                       "r_shoulder": "r_elbow", "r_elbow": "r_shoulder"}  # fmt: skip
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_robots_that_are_drawn_are_robots(index: int) -> None:
+    """Every link weighs something, springs bend a little under it, and the same name is the same robot."""
+    name = drawn_name(3, index)
+    assert drawn_robot(name) == drawn_robot(name)
+    robot, truth = nominal_robot(name), nominal_truth(name)
+    assert 1 <= robot.n <= MOST_JOINTS
+    gravity = np.abs([pin.computeGeneralizedGravity(robot.model, robot.model.createData(), q)
+                      for q in np.random.default_rng(0).uniform(-1.0, 1.0, (200, robot.n))])  # fmt: skip
+    for i in robot.elastic_indices:
+        assert gravity[:, i].max() < 0.25 * truth.stiffness[i]
+    assert np.all(truth.coulomb > 0.0)
+    assert np.all(truth.viscous > 0.0)

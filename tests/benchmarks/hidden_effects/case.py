@@ -72,7 +72,7 @@ class Case:
         row: row of the table that it belongs to.
         seed: seed of the run.
         index: number of the case within its row.
-        robot: name in `plants.ROBOTS`.
+        robot: name in `plants.ROBOTS`, or of one that is drawn.
         engine: `mujoco` or `project`.
         period: [s].
         periods: periods of the training recording.

@@ -16,6 +16,7 @@ from tests.benchmarks.hidden_effects.catalogue import (
     draw_effect,
     places,
 )
+from tests.benchmarks.hidden_effects.drawn_robots import drawn_name
 from tests.benchmarks.hidden_effects.engine import Friction
 from tests.benchmarks.hidden_effects.gap import TREND_EFFECTS, Gauge
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth
@@ -71,6 +72,7 @@ ROWS = {
             half=True,
             robots=("prosthesis", "oblique_arm", "torso"),
         ),
+        Row("drawn", "robots drawn from the seed, nothing or one effect", 12, LIBRARY, half=True),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }
@@ -119,6 +121,8 @@ def draw_case(seed: int, row: str, index: int) -> Case:
     robot = {3: "baxter", 7: "ur5"}.get((index + 3 * what.number) % 10, "exo_leg")
     if what.robots:
         robot = what.robots[index % len(what.robots)]
+    if row == "drawn":
+        robot = drawn_name(seed, index)
     case = Case(
         row=row,
         seed=seed,

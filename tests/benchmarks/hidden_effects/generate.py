@@ -11,7 +11,7 @@ from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.draw import row_generator, settling, trajectories_of, truth_of
 from tests.benchmarks.hidden_effects.engine import friction_of, simulate_mujoco
 from tests.benchmarks.hidden_effects.gap import TREND_EFFECTS
-from tests.benchmarks.hidden_effects.plants import ROBOTS, Truth, nominal_robot
+from tests.benchmarks.hidden_effects.plants import Truth, nominal_robot, source_of
 from tests.benchmarks.hidden_effects.project_engine import record_project
 from tests.benchmarks.hidden_effects.sensors import record
 
@@ -36,7 +36,7 @@ def generate(case: Case, root: Path) -> None:
     folder = case_folder(root, case.label)
     folder.mkdir(parents=True, exist_ok=True)
     truth, series = truth_of(case), trajectories_of(case)
-    robot, how = nominal_robot(case.robot), ROBOTS[case.robot]
+    robot, how = nominal_robot(case.robot), source_of(case.robot)
     (folder / "robot.urdf").write_text(robot.urdf, encoding="utf-8")
     if how.annotation is not None and robot.annotation is not None:
         (folder / "annotation.urdf").write_text(robot.annotation, encoding="utf-8")

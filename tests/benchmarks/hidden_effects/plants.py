@@ -1,7 +1,8 @@
 """Robots of the benchmark and the truth behind their nominal descriptions."""
 
+import tempfile
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pinocchio as pin
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.robot import Robot, load_robot
 from tests.benchmarks.hidden_effects.case import FloatArray
+from tests.benchmarks.hidden_effects.drawn_robots import drawn_robot
 
 FOLDER = Path(__file__).parent / "robots"
 BAXTER_ARM = tuple(f"left_{j}" for j in ("s0", "s1", "e0", "e1", "w0", "w1", "w2"))
@@ -21,7 +23,7 @@ class RobotSource:
     """How `load_robot` finds a robot, and priors that its description does not give.
 
     Attributes:
-        source: first argument of `load_robot`.
+        source: first argument of `load_robot`, or the description itself of a robot that is drawn.
         annotation: second argument.
         joints: third argument.
         viscous: viscous friction of joints without a stated one [N m s/rad].
@@ -61,12 +63,25 @@ ROBOTS = {
 
 
 @cache
+def source_of(name: str) -> RobotSource:
+    """How the robot of a name is found: one of `ROBOTS`, or one that is drawn."""
+    if name in ROBOTS:
+        return ROBOTS[name]
+    drawn = drawn_robot(name)
+    return RobotSource(drawn.urdf, **{f.name: getattr(drawn, f.name) for f in fields(drawn) if f.name != "urdf"})
+
+
+@cache
 def nominal_robot(name: str) -> Robot:
     """The robot as its description has it."""
-    how = ROBOTS[name]
-    with warnings.catch_warnings():
+    how = source_of(name)
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore", SeaIdentWarning)
-        return load_robot(how.source, how.annotation, how.joints)
+        if name in ROBOTS:
+            return load_robot(how.source, how.annotation, how.joints)
+        file = Path(folder) / f"{name}.urdf"
+        file.write_text(how.source, encoding="utf-8")
+        return load_robot(file)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +107,7 @@ class Truth:
 
 def nominal_truth(name: str) -> Truth:
     """The truth that equals the nominal description."""
-    robot, how = nominal_robot(name), ROBOTS[name]
+    robot, how = nominal_robot(name), source_of(name)
     springs = [robot.spring(j.name) if j.elastic else None for j in robot.joints]
     viscous = [j.actuator.viscous_friction if j.actuator else how.viscous[i] for i, j in enumerate(robot.joints)]
     coulomb = [j.actuator.coulomb_friction if j.actuator else how.coulomb[i] for i, j in enumerate(robot.joints)]

@@ -9,7 +9,7 @@ from sea_ident.effects import base_effects
 from sea_ident.motion import FourierSeries
 from sea_ident.regressor import build_regressor
 from tests.benchmarks.hidden_effects.case import FloatArray
-from tests.benchmarks.hidden_effects.plants import ROBOTS, nominal_robot
+from tests.benchmarks.hidden_effects.plants import nominal_robot, source_of
 
 HARMONICS = 5
 MARGIN = 0.95
@@ -47,7 +47,7 @@ def draw_trajectory(
 
 
 def _draw(name: str, period: float, rng: np.random.Generator, weak: bool) -> FourierSeries:
-    robot, how = nominal_robot(name), ROBOTS[name]
+    robot, how = nominal_robot(name), source_of(name)
     limits, n = robot.limits, robot.n
     harmonics = 2 if weak else HARMONICS
     order = np.arange(1, harmonics + 1)
