@@ -21,6 +21,9 @@ from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
 INSTANTS = 160
 """Instants in a period between which every push is compared."""
 
+BEYOND = 2.0
+"""Distances between these up to which edges are looked for on either side of the best window."""
+
 FINE_STEP = 1.0 / 8.0
 """Step by which edges are moved within a sample or beyond, in samples, ..."""
 
@@ -83,8 +86,9 @@ def with_sharp_edges(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, b
     both = fit, _with(fit, position, stop, start, bench, noise)
     fit = min(both, key=lambda each: (nearly_always(bench, each.effects[position]), each.statistic))
     if stride > 1:
-        # a large push leaves much by edges that are a little off, so a window says little of what it may come to
-        fit = _sharpened(bench, fit, noise, position, float(stride), 1.0)
+        # a large push leaves much by edges that are a little off, so a window says little of what it may come to;
+        # and where samples were left out near an edge, the best of the windows may be on the wrong side of these
+        fit = _sharpened(bench, fit, noise, position, BEYOND * stride, 1.0)
     if fit.statistic > FAR_ABOVE * beat:
         fit = _sharpened(bench, fit, noise, position, 2.0 * COARSE_STEP, COARSE_STEP)
     if fit.statistic > FAR_ABOVE * beat:

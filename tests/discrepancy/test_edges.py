@@ -48,6 +48,27 @@ def test_the_edges_are_found_to_the_sample_from_any_window(pushed, window):
 
 
 @pytest.mark.scenario
+def test_edges_are_looked_for_beyond_the_next_windows(pushed, monkeypatch):
+    """Where samples were left out near an edge there is a minimum on either side, and the worse may be in a window."""
+    bench, now = pushed
+    sample, stride = PERIOD / bench.data.samples, bench.data.samples // edges.INSTANTS
+    effect = make_effect("external_force", "knee", start=START, stop=STOP, period=PERIOD)
+    begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
+    found, looked = edges._best_edges, []
+
+    def best_edges(bench, fit, noise, position, firsts, lasts):
+        looked.append(lasts - fit.effects[position].stop)
+        return found(bench, fit, noise, position, firsts, lasts)
+
+    monkeypatch.setattr(edges, "_best_window", lambda *_: (START, STOP))
+    monkeypatch.setattr(edges, "_best_edges", best_edges)
+    with_sharp_edges(bench, begun, now.noise, len(now.fit.effects))
+    widest = max(looked, key=np.max)
+    assert min(-widest[0], widest[-1]) >= 1.5 * stride * sample
+    assert np.diff(widest) == pytest.approx(sample)
+
+
+@pytest.mark.scenario
 def test_a_push_is_not_taken_for_one_that_pauses_then(pushed, monkeypatch):
     """What pushes back all the time but then differs by a constant force, of which a model takes up the most."""
     bench, now = pushed
