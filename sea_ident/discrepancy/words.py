@@ -144,8 +144,8 @@ def at_rest(joint: str) -> str:
 def on_the_centre(joint: str) -> str:
     """That how large a push is was told as if on the centre of mass."""
     return (
-        f"external_force at {joint} is told as a force on the centre of mass of its link as described: this motion "
-        "does not show where it meets the link, and a smaller one farther from the joint would do the same"
+        f"external_force at {joint} is told as a force on the centre of mass of its link as described, for no other "
+        "point fits clearly better: one that meets the link farther from the joint would be as much smaller"
     )
 
 
