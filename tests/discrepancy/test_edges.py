@@ -48,6 +48,25 @@ def test_the_edges_are_found_to_the_sample_from_any_window(pushed, window):
 
 
 @pytest.mark.scenario
+def test_edges_are_known_to_a_small_part_of_a_sample(laboratory):
+    """A sixty-fourth: of a large push on a precise recording that is what stands out of the noise."""
+    bench = laboratory.bench(laboratory.record(periods=5))
+    sample = PERIOD / bench.data.samples
+    push = make_effect("external_force", "knee", start=1.3364, stop=1.9702, period=PERIOD)
+    rows = bench.data.rows(push.evaluate(bench.state(bench.effects))) @ np.array([60.0, 0.0, -190.0])
+    bench = bench.comparing(replace(bench.data, known=-rows))
+    now = settle(bench, bench.effects)
+    effect = replace(push, start=push.start + 1.3 * sample, stop=push.stop - 0.7 * sample)
+    begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
+    noise = bench.noise(begun)
+    found = with_sharp_edges(
+        bench, bench.fit(begun.effects, noise, start=begun.parameters), noise, len(now.fit.effects)
+    )
+    assert found.effects[-1].start == pytest.approx(push.start, abs=sample / 40.0)
+    assert found.effects[-1].stop == pytest.approx(push.stop, abs=sample / 40.0)
+
+
+@pytest.mark.scenario
 def test_edges_are_looked_for_beyond_the_next_windows(pushed, monkeypatch):
     """Where samples were left out near an edge there is a minimum on either side, and the worse may be in a window."""
     bench, now = pushed
