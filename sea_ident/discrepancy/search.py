@@ -226,6 +226,7 @@ def _eliminate(
         if worst[0].p_value <= FAMILY_LEVEL:
             break
         now = settle_again(bench, bench.again(worst[0].left, noise))
+        # its edges were those of a push that stood where it does not, or that another stood in for
         now = _formed(bench, now) if is_push(fit.effects[worst[1]]) else now
         del added[worst[1] - first]
     return now, added

@@ -1,15 +1,17 @@
 """A push is found to the sample, from wherever the search for its edges begins."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy import edges
+import sea_ident
+from sea_ident.discrepancy import edges, words
 from sea_ident.discrepancy.assess import rivals
 from sea_ident.discrepancy.decide import simplest_first
-from sea_ident.discrepancy.edges import _best_window, at_centre, stays_on_the_centre, with_sharp_edges
+from sea_ident.discrepancy.edges import _best_window, at_centre, stays_on_the_centre, with_sharp_edges, without_another
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, _eliminate, search
@@ -17,6 +19,7 @@ from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import State, make_effect
 from sea_ident.effects.external_force import POINT
+from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.robot import load_robot
 
@@ -193,6 +196,28 @@ def test_how_large_a_push_on_a_centre_of_mass_is_depends_on_where_it_is(pushed_t
     bench, now, shank, _ = pushed_thigh
     assert stays_on_the_centre(bench, at_centre(bench, shank.fit, shank.noise, len(now.fit.effects)), -1)
     assert not any(stays_on_the_centre(bench, now.fit, k) for k in range(len(now.fit.effects)))
+
+
+@pytest.mark.scenario
+def test_a_diagnosis_says_where_the_force_that_it_tells_is_thought_to_push(laboratory):
+    push = make_effect("external_force", "hip", start=START, stop=STOP, period=PERIOD)
+    recording = laboratory.record([(push, np.array([8.0, 0.0, 4.0]))])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = sea_ident.diagnose(sea_ident.identify(laboratory.leg, recording, period=PERIOD), recording)
+    assert [(m.effect, m.joint) for m in found.missing] == [("external_force", "hip")]
+    assert words.on_the_centre("hip") in found.warnings
+
+
+@pytest.mark.scenario
+def test_pushes_at_different_times_do_not_stand_in_for_each_other(pushed):
+    bench, now = pushed
+    pushes = [
+        make_effect("external_force", "knee", start=a, stop=b, period=PERIOD) for a, b in ((4.13, 0.62), (1.5, 2.0))
+    ]
+    fit, first = bench.fit((*now.fit.effects, pushes[0]), now.noise, start=now.fit.parameters), len(now.fit.effects)
+    assert without_another(bench, fit, now.noise, pushes[1], first) is fit
+    assert without_another(bench, fit, now.noise, replace(pushes[0], stop=0.61), first) is not fit
 
 
 @pytest.mark.filterwarnings("ignore:emps")

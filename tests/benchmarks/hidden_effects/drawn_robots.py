@@ -1,7 +1,7 @@
 """Robots that nobody built: trees of one to six links, drawn from a seed.
 
-Axes point along an axis of their link or anywhere, links are 10 cm to 1.5 m long, joints are elastic or rigid by turns
-of chance. Springs, rotors and friction are in proportion to the weight that a joint carries.
+Axes point along an axis of their link or anywhere, links are 5 cm to 1.5 m long, chance makes joints elastic or rigid.
+Springs, rotors and friction are in proportion to the weight that a joint carries.
 """
 
 from dataclasses import dataclass
@@ -9,9 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.benchmarks.hidden_effects.case import FloatArray, generator
-
-PREFIX = "drawn"
-"""Beginning of their names, which go on with a seed and a number."""
 
 MOST_JOINTS = 6
 GRAVITY = 9.81
@@ -40,7 +37,7 @@ class DrawnRobot:
 
 def drawn_name(seed: int, index: int) -> str:
     """Name of a robot that is drawn."""
-    return f"{PREFIX}-{seed}-{index}"
+    return f"drawn-{seed}-{index}"
 
 
 def drawn_robot(name: str) -> DrawnRobot:
