@@ -16,7 +16,7 @@ from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Side, effect_from_dict
 from sea_ident.estimation.agreement import Agreement
 from sea_ident.estimation.model import Excerpt, Fit, Model
-from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
+from sea_ident.estimation.spring_result import SpringLack, SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update
 from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError
@@ -300,6 +300,7 @@ def _spring_to_dict(spring: SpringResult) -> dict[str, Any]:
         "held_out": spring.held_out,
         "noise": spring.noise,
         "misfit": [list(row) for row in spring.misfit],
+        "lack": None if spring.lack is None else asdict(spring.lack),
     }
 
 
@@ -326,7 +327,15 @@ def _spring_from_dict(entry: Mapping[str, Any], robot: Robot) -> SpringResult:
         full_covariance=tuple(tuple(row) for row in whole),
         noise=None if entry.get("noise") is None else float(entry["noise"]),
         misfit=tuple(tuple(float(v) for v in row) for row in entry.get("misfit", ())),
+        lack=_lack_from_dict(entry.get("lack")),
     )
+
+
+def _lack_from_dict(record: Mapping[str, Any] | None) -> SpringLack | None:
+    if record is None:
+        return None
+    effects = tuple(str(name) for name in record["effects"])
+    return SpringLack(effects, float(record["rms_residual"]), float(record["stiffness"]))
 
 
 def _term_from_dict(record: Mapping[str, Any], joint: str, robot: Robot) -> SpringTerm:

@@ -25,6 +25,24 @@ class SpringTerm:
     by_rest: bool = False
 
 
+@dataclass(frozen=True)
+class SpringLack:
+    """What would take most of what the law of a spring leaves beyond noise.
+
+    It need not be what is missing: others have the same form. How far the law is from its own beside it is counted in
+    the standard deviations.
+
+    Attributes:
+        effects: names of effects at the joint, what takes the most first.
+        rms_residual: of the spring torque beside them [N m].
+        stiffness: K1 beside them [N m/rad].
+    """
+
+    effects: tuple[str, ...]
+    rms_residual: float
+    stiffness: float
+
+
 class Verdict(StrEnum):
     """What the data say about the law of a spring."""
 
@@ -67,6 +85,7 @@ class SpringResult:
             periods [N m] or [N].
         misfit: (3, 3) part of `covariance` that counts what the law leaves beyond its noise as random; empty where it
             leaves no more than noise.
+        lack: what would take most of that; None where nothing simple does, or nothing is left.
     """
 
     joint: str
@@ -91,6 +110,7 @@ class SpringResult:
     full_covariance: tuple[tuple[float, ...], ...] = ()
     noise: float | None = None
     misfit: tuple[tuple[float, ...], ...] = ()
+    lack: SpringLack | None = None
 
     @property
     def law(self) -> tuple[float, float, float]:
@@ -138,8 +158,15 @@ class SpringResult:
         if not self.misfit or self.noise is None:
             return None
         times = self.rms_residual / max(self.noise, 1e-300)
+        counted = "Standard deviations count this as random"
+        if self.lack is not None:
+            counted = (
+                f"Beside something of the form of {' and '.join(self.lack.effects)} it would leave "
+                f"{self.lack.rms_residual:.3g}, and its stiffness be {self.lack.stiffness:.4g} instead of "
+                f"{self.stiffness:.4g}: standard deviations count how far that is"
+            )
         return (
             f"spring of {self.joint}: its law leaves {times:.2g} times the noise of its torque "
             f"({self.rms_residual:.3g} of {self.rms_torque:.3g}): it lacks something, or the dynamic model that gives "
-            "this torque does. Standard deviations count this as random; diagnose tells what it is"
+            f"this torque does. {counted}; diagnose tells what it is"
         )

@@ -13,6 +13,9 @@ FOLDS = 10
 EXCITED = 0.25
 """Relative standard deviation of the stiffness beyond which a spring counts as not excited."""
 
+SLIPS = (0.15, 0.6)
+"""Deflections at which a slipping element that is tried slips, as shares of the rms deflection [-]."""
+
 SUPPORT = 1e-3
 """Significance that a term beyond the linear spring needs."""
 
@@ -41,10 +44,10 @@ def hysteresis_column(deflection: FloatArray, width: float) -> FloatArray:
 def held_out_rms(columns: FloatArray, motion: Motion, joint: int, zero: float, tau: FloatArray) -> dict[str, float]:
     """Rms [N m] on pieces of the period that were left out of the fit, by law."""
     deflection = motion.deflection[:, joint] - zero
-    reach = 3.0 * float(np.std(deflection))
+    spread = float(np.std(deflection))
     laws = {"linear": np.delete(columns, 1, axis=1), "cubic": columns}
-    for share in (0.05, 0.2):
-        slip = hysteresis_column(deflection, max(share * reach, 1e-300))
+    for share in SLIPS:
+        slip = hysteresis_column(deflection, max(share * spread, 1e-300))
         laws[f"hysteresis {share:g}"] = np.column_stack([columns, slip])
     pieces = np.array_split(np.arange(len(tau)), FOLDS)
     found = {}

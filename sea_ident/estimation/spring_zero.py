@@ -45,9 +45,9 @@ def other_zeros(observations: Observations, values: FloatArray, springs: Sequenc
             continue
         unit, name = robot.joints[joint].position_unit, spring.joint
         found.append(
-            f"spring of {name}: with zeros of theta_{name} and q_{name} that differ by {zero:.4g} {unit} its law "
-            f"leaves {left:.3g} instead of {spring.rms_residual:.3g}, and its stiffness is {law[0]:.4g} instead of "
-            f"{spring.stiffness:.4g}. Unless a constant torque acts there, have the difference fitted "
-            f"(unknown_zero, on the command line --unknown-zero {name}), or correct the zero of one encoder"
+            f"spring of {name}: zeros of theta_{name} and q_{name} that differ by {zero:.4g} {unit} would explain it: "
+            f"beside them its law leaves {left:.3g} instead of {spring.rms_residual:.3g}, and its stiffness is "
+            f"{law[0]:.4g}. Unless a constant torque acts there, have the difference fitted (unknown_zero, on the "
+            f"command line --unknown-zero {name}), or correct the zero of one encoder"
         )
     return found

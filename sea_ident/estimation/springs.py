@@ -14,6 +14,7 @@ from sea_ident.estimation.circularity import circular_factor, circular_note
 from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.solve import solve_across
+from sea_ident.estimation.spring_lack import beside_the_law, spring_lack
 from sea_ident.estimation.spring_misfit import spring_misfit
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.spring_untold import ROUNDING, told_by_rest, untold
@@ -27,6 +28,9 @@ from sea_ident.processing.harmonics import differentiate
 
 if TYPE_CHECKING:
     from sea_ident.estimation.model import Model
+
+DOUBTED = 2.0
+"""Standard deviations below which a cubic term may be made by what the law lacks [-]."""
 
 
 @one_thread
@@ -240,18 +244,25 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         guess = np.linalg.lstsq(whole / scale, tau, rcond=None)[0] / scale
         extra = -(guess[0] + 3.0 * guess[1] * columns[:, :1] ** 2)
     values, inverse = _solve(data, zero, extra)
-    residual = tau - np.column_stack([whole, extra]) @ values
+    design = np.column_stack([whole, extra])
+    residual = tau - design @ values
     law_values, law_inverse = values[:count], inverse[:count]
     left = data.left_in_periods(law_values, zero)
     full = _covariance(data, law_inverse, left, residual)
     # a verdict is about noise: what the law lacks is no lack of excitation
     noise_std = np.sqrt(np.maximum(np.diag(full), 0.0))
-    misfit = None
+    misfit = lacking = lack = None
     if left is not None:
         repeated = abs(float(law_values[0])) * data.repeated
         misfit = spring_misfit(left, law_inverse, whole, data.rows, data.uncertainty, data.harmonics, repeated)
         if misfit.covariance is not None:
-            full = full + misfit.covariance
+            lacking = misfit.covariance
+            beside = beside_the_law(motion, joint, zero)
+            found = spring_lack(values, left.mean(axis=0), inverse, design, beside, misfit.noise, data.harmonics)
+            if found is not None:
+                lack, shift = found
+                lacking = lacking + np.outer(shift[:count], shift[:count])
+            full = full + lacking
     at_rest = told_by_rest(whole, law_values)
     full = full + at_rest @ at_rest.T
     law, covariance = values[:3], full[:3, :3]
@@ -262,6 +273,8 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
     held_out = held_out_rms(whole, motion, joint, zero, tau)
     spread = f"{np.std(columns[:, 0]):.2g} {data.unit}"
     verdict, note = verdict_of(law, noise_std, freedom, held_out, spread, float(np.std(tau)))
+    if lacking is not None and verdict is Verdict.STIFFENING and abs(law[1]) < DOUBTED * std[1]:
+        note = f"{note}, which may be what its law lacks"
     return SpringResult(
         joint=name,
         stiffness=float(law[0]),
@@ -284,7 +297,8 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         terms=_terms(data, values, std, np.any(at_rest != 0.0, axis=1)),
         full_covariance=_rows(full) if data.effects else (),
         noise=None if misfit is None else misfit.noise,
-        misfit=() if misfit is None or misfit.covariance is None else _rows(misfit.covariance[:3, :3]),
+        misfit=() if lacking is None else _rows(lacking[:3, :3]),
+        lack=lack,
     )
 
 

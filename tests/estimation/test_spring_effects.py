@@ -55,7 +55,7 @@ def test_the_law_beside_them_is_that_of_the_spring(leg, model, recording):
         pytest.warns(SeaIdentWarning, match="spring of ankle: its law leaves"),
         pytest.warns(SeaIdentWarning, match="spring of knee: its law leaves"),
         # an offset of the spring and a zero of its encoders are the same in one recording
-        pytest.warns(SeaIdentWarning, match="spring of ankle: with zeros of theta_ankle and q_ankle that differ by"),
+        pytest.warns(SeaIdentWarning, match="spring of ankle: zeros of theta_ankle and q_ankle that differ by"),
     ):
         plain = identify(leg, recording, period=leg_series().period)  # without the offset of that spring
     with_term, without = (next(s for s in m.springs if s.joint == "knee") for m in (model, plain))
