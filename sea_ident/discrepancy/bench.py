@@ -13,7 +13,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.columns import Evaluated
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit, Known
-from sea_ident.discrepancy.free_shapes import free_shapes, moved_within, room
+from sea_ident.discrepancy.free_shapes import free_shapes, moved_within, room, turning_in_sight
 from sea_ident.discrepancy.linear import off, span, whiten
 from sea_ident.discrepancy.noise import (
     REPEATED_VARIANCE,
@@ -144,7 +144,8 @@ class Bench(ParameterFits):
         Returns:
             The fit.
         """
-        fit = self.fit(effects, noise, start=start, tangents=False, known=known)
+        begun = turning_in_sight(effects, self.data.slowest, only)
+        fit = self.fit(begun, noise, start=start, tangents=False, known=known)
         caution = _Caution()
         for _ in range(rounds):
             stood, last, better = caution.others_stand, fit, self._refine_step(fit, noise, only, caution)

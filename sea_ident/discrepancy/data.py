@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import SIGNALS, closing_weights, mean_of_periods
 from sea_ident.effects import Contribution
+from sea_ident.effects.state import Side
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording, process
@@ -138,6 +140,17 @@ class PeriodData:
     def samples(self) -> int:
         """Number N of samples of a period."""
         return len(self.motion)
+
+    @cached_property
+    def slowest(self) -> Mapping[tuple[str, Side], float]:
+        """Least speed that is compared, by joint and what moves at it: the motor or the link [rad/s] or [m/s]."""
+        found = {}
+        for e, equation in enumerate(self.equations):
+            link = equation.kind is EquationKind.LINK
+            speed = np.abs((self.motion.dq if link else self.motion.dtheta)[:, equation.index])
+            compared = speed[~self.left_out[:, e]]
+            found[equation.joint, Side.LINK if link else Side.MOTOR] = float(compared.min(initial=np.inf))
+        return found
 
     def rows(self, part: Contribution) -> FloatArray:
         """(N, E, ...) rows of the equations from link and motor rows (N, n, ...)."""

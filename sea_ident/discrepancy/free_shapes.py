@@ -1,6 +1,6 @@
 """Nonlinear parameters of a model: which are free, and how they move."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -10,9 +10,14 @@ from sea_ident.effects import Effect, JointEffect, Shape
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.external_force import POINT, WHEN, ExternalForce
+from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.effects.spring_stiffening import BESIDE_CUBIC, CUBIC, SpringStiffening
+from sea_ident.effects.state import Side
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
+
+IN_SIGHT = 5.0
+"""Speed, over that at which friction turns over, from which on a sample does not tell the one from any lower [-]."""
 
 SHAPES_THAT_STAY = {
     "asymmetric_spring": ("kink",),
@@ -120,6 +125,29 @@ def _along(effect: Effect, one: Effect, there: Effect) -> Effect:
     if own and getattr(effect, "smoothing", None) == one.smoothing:
         return replace(effect, smoothing=there.smoothing)  # type: ignore[call-arg]
     return effect
+
+
+def turning_in_sight(
+    effects: Sequence[Effect], slowest: Mapping[tuple[str, Side], float], only: int = 0
+) -> tuple[Effect, ...]:
+    """A model whose friction turns over no further below all speeds that are compared than a step leads back from.
+
+    Friction that a model lacks may sharpen the turn of what it has without an end. Once it is there, the turn is where
+    it was: no sample is slower, and none tells that it lies elsewhere.
+
+    Args:
+        effects: the model.
+        slowest: least speed that is compared, by joint and side.
+        only: position from which on shapes may move.
+    """
+    for position, effect in enumerate(effects):
+        if position < only or not isinstance(effect, (CoulombFriction, LinkFriction)):
+            continue
+        least = slowest.get((effect.required_joint, effect.side), np.inf) / IN_SIGHT
+        (shape,) = effect.shapes
+        if np.isfinite(least) and effect.smoothing < least:
+            effects = moved_within(effects, position, shape, float(np.log(least / effect.smoothing)))
+    return tuple(effects)
 
 
 def room(effect: Effect, shape: Shape) -> tuple[float, float]:

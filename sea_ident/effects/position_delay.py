@@ -26,7 +26,7 @@ class PositionDelay(SignalEffect):
 
     name: ClassVar[str] = "position_delay"
     source: ClassVar[str] = "Swevers, Verdonck, De Schutter, Dynamic model identification for industrial robots, 2007"
-    amounts: ClassVar[tuple[Shape, ...]] = (Shape("delay", "s", -0.05, 0.05, logarithmic=False),)
+    amounts: ClassVar[tuple[Shape, ...]] = (Shape("delay", "s", -0.1, 0.1, logarithmic=False),)
 
     def corrected(self, robot: Robot, motion: Motion) -> Motion:
         """Q as it was at the time."""

@@ -25,7 +25,7 @@ class TorqueDelay(SignalEffect):
 
     name: ClassVar[str] = "torque_delay"
     source: ClassVar[str] = "Swevers, Verdonck, De Schutter, Dynamic model identification for industrial robots, 2007"
-    amounts: ClassVar[tuple[Shape, ...]] = (Shape("delay", "s", -0.05, 0.05, logarithmic=False),)
+    amounts: ClassVar[tuple[Shape, ...]] = (Shape("delay", "s", -0.1, 0.1, logarithmic=False),)
 
     def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
         """The speed of the motor when the recorded torque acts: that is when its friction jumps in the record."""
