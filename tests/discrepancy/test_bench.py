@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.free_shapes import free_shapes, moved, moved_within, room
+from sea_ident.discrepancy.free_shapes import free_shapes, moved, moved_within, room, turning_in_sight
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import effect_classes, make_effect
@@ -99,6 +99,34 @@ def test_only_what_is_anchored_in_the_friction_of_a_motor_moves_with_it():
     order = make_effect("torque_ripple", "hip").shapes[0]
     ripple = make_effect("torque_ripple", "hip")
     assert moved_within((ripple, friction, loss), 0, order, 0.1)[1:] == (friction, loss)
+
+
+def test_friction_that_turns_over_out_of_sight_is_brought_where_samples_tell_of_it():
+    friction, link = make_effect("coulomb_friction", "hip"), make_effect("link_friction", "hip")
+    loss, other = make_effect("load_dependent_friction", "hip"), make_effect("coulomb_friction", "knee")
+    sharp = [replace(effect, smoothing=2e-4) for effect in (friction, loss, link, other)]
+    slowest = {("hip", friction.side): 0.004, ("hip", link.side): 0.02, ("knee", friction.side): np.inf}
+    found = turning_in_sight(sharp, slowest)
+    # what is anchored in the friction of the motor goes with it; nothing slow is compared at the knee
+    assert [effect.smoothing for effect in found] == pytest.approx([8e-4, 8e-4, 4e-3, 2e-4])
+    assert turning_in_sight(sharp, slowest, only=2)[:2] == tuple(sharp[:2])
+    assert turning_in_sight((friction, loss, link), slowest) == (friction, loss, link)
+
+
+@pytest.mark.parametrize("joint", ["knee", "ankle"])
+def test_friction_that_turned_over_out_of_sight_comes_back(laboratory, joint):
+    """From a turn that no sample tells from a sharper one, the fit ends where it does from anywhere else."""
+    quiet = SensorNoise(5e-6, 3e-6, link_resolution=6e-6, motor_resolution=3e-6, current=0.005, motor_torque=0.02)
+    bench = laboratory.bench(laboratory.record(sensors=quiet))
+    now, at = settle(bench, bench.effects), ("coulomb_friction", joint)
+    effects = list(now.fit.effects)
+    position = next(k for k, effect in enumerate(effects) if (effect.name, effect.joint) == at)
+    effects[position] = replace(effects[position], smoothing=1e-4)
+    lost = bench.fit(effects, now.noise, start=now.fit.parameters, tangents=False)
+    assert lost.statistic > now.fit.statistic + 0.5
+    found = bench.refine(effects, now.noise, start=now.fit.parameters)
+    assert found.statistic == pytest.approx(now.fit.statistic, abs=0.1)
+    assert found.effects[position].smoothing == pytest.approx(now.fit.effects[position].smoothing, rel=0.1)
 
 
 @pytest.mark.parametrize("name", sorted(name for name, kind in effect_classes().items() if hasattr(kind, "smoothing")))
