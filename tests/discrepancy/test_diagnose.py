@@ -207,3 +207,18 @@ def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_m
     doubtful = sea_ident.diagnose(replace(intact_model, robot=narrow), training, holdout=holdout)
     assert doubtful.verdict == "none"
     assert any("cannot be used; nothing was tested on it" in text for text in doubtful.warnings)
+
+
+@pytest.mark.scenario
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+@pytest.mark.parametrize("effect", ["torque_delay", "position_delay"])
+def test_a_signal_that_is_50_ms_late_is_named_alone(leg, laboratory, effect):
+    """A delay that its range does not hold leaves something beside it, and that gets a name."""
+    late = 0.05 if effect == "position_delay" else -0.05
+    training, holdout = (laboratory.record([(effect, "hip", [], {"delay": late})], motion=k) for k in (0, 1))
+    diagnosis = sea_ident.diagnose(sea_ident.identify(leg, training, period=5.0), training, holdout=holdout)
+    assert diagnosis.verdict == "named"
+    (found,) = diagnosis.missing
+    assert (found.effect, found.joint) == (effect, "hip")
+    (delay,) = found.parameters
+    assert abs(delay.value - late) < 3.0 * delay.std
