@@ -1,6 +1,6 @@
 """Effects that a search or a test of trends found, with the numbers that are told of them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +11,12 @@ from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingPa
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
+from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.uncertainty import uncertainties
-from sea_ident.effects import Effect, Side
+from sea_ident.effects import Effect, Shape, Side
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.estimation.spring_untold import told_by_rest
 from sea_ident.estimation.springs import spring_columns
@@ -35,7 +36,8 @@ def named_effects(
         alternatives: what else it may be, by the position among the effects.
         held: how it did on data that was not used.
     """
-    fit, stds = selection.final.fit, uncertainties(bench, selection.final)
+    fit, open_ = selection.final.fit, with_open_powers(bench, selection.final)
+    stds, free = uncertainties(bench, open_), open_.fit.free_shapes
     first = len(fit.effects) - selection.added
     out = []
     nameless = resting(selection, held)
@@ -43,7 +45,8 @@ def named_effects(
         if k in nameless:
             continue
         transfer = held.transfers[k] if held is not None and held.transfers else None
-        found = named_effect(bench, fit, position, stds, selection.p_values[k], alternatives.get(position, ()))
+        others = alternatives.get(position, ())
+        found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free)
         out.append(replace(found, transfer=None if transfer is None or not transfer.tested else transfer.share))
     return out
 
@@ -55,6 +58,7 @@ def named_effect(
     stds: FloatArray,
     p_value: float,
     alternatives: Sequence[Alternative],
+    free: Sequence[tuple[int, Shape]] | None = None,
 ) -> MissingEffect:
     """An effect that was found, with the numbers that are told of it.
 
@@ -62,9 +66,10 @@ def named_effect(
         bench: the recording.
         fit: the model with it.
         position: of it among the effects.
-        stds: (p + s,) standard deviations of the parameters, and of the shapes in the order of `free_shapes`.
+        stds: (p + s,) standard deviations of the parameters, and of the shapes that are free.
         p_value: probability of finding as much where nothing is missing.
         alternatives: what else it may be.
+        free: (s,) shapes that are free; those of the fit by default.
     """
     effect, counts = fit.effects[position], bench.counts(fit.effects)
     own = range(sum(counts[:position]), sum(counts[: position + 1]))
@@ -77,7 +82,9 @@ def named_effect(
         if shown
     ]
     at_rest = bool(len(values)) and bool(np.all(by_rest > 0.0))
-    parameters.extend(_shape_parameters(bench, fit, position, stds, at_rest))
+    own_free = [(len(fit.columns) + k, s) for k, (owner, s) in enumerate(free or fit.free_shapes) if owner == position]
+    stds_of = {shape.name: (float(stds[place]), shape) for place, shape in own_free}
+    parameters.extend(_shape_parameters(bench, effect, stds_of, at_rest))
     return MissingEffect(
         effect=effect.name,
         joint=effect.joint,
@@ -99,18 +106,18 @@ def _told_by_rest(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) ->
     return np.asarray(np.linalg.norm(off[3:], axis=1), dtype=np.float64)
 
 
-def _shape_parameters(bench: Bench, fit: Fit, position: int, stds: FloatArray, at_rest: bool) -> list[MissingParameter]:
+def _shape_parameters(
+    bench: Bench, effect: Effect, stds: Mapping[str, tuple[float, Shape]], at_rest: bool
+) -> list[MissingParameter]:
     """The shapes of an effect; what is at rest all the time does not show where it would not be."""
-    effect = fit.effects[position]
     out = []
     for shape in effect.ranges:
         value = float(getattr(effect, shape.name))
         std = 0.0
-        for k, (owner, free) in enumerate(fit.free_shapes):
-            if owner == position and free.name == shape.name:
-                step = float(stds[len(fit.columns) + k])
-                std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
-                std = float(np.hypot(std, value)) if at_rest else std
+        if shape.name in stds:
+            step, free = stds[shape.name]
+            std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)
+            std = float(np.hypot(std, value)) if at_rest else std
         out.append(
             MissingParameter(effect.parameter_name(shape.name), value, std, effect.shape_unit(shape, bench.robot))
         )

@@ -7,8 +7,11 @@ asked beside a settled model: how much is taken away, and in which noise, follow
 
 from dataclasses import replace
 
+import numpy as np
+
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.settle import Settled, settle_again
@@ -34,6 +37,8 @@ MOST_ROUNDS = 3
 def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
     """A settled model in which a saturation has another power than three where that explains much more.
 
+    And in which a spring stiffens by its own power where that is told from the one that a search tried.
+
     Args:
         bench: the recording.
         now: the model with what was found.
@@ -44,6 +49,9 @@ def with_their_powers(bench: Bench, now: Settled, first: int) -> Settled:
     """
     for position in range(first, len(now.fit.effects)):
         effect = now.fit.effects[position]
+        own = with_its_power(bench, now.fit, now.noise, position)
+        if now.fit.statistic - own.statistic > EQUALLY_GOOD * own.unit:
+            now = settle_again(bench, own)
         if not isinstance(effect, TorqueSaturation) or effect.exponent != CUBE:
             continue
         if lack_of_fit(bench, now)[2] >= LACK_LEVEL:
@@ -79,6 +87,22 @@ def with_its_power(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> 
     effects[position] = replace(effect, exponent=ANOTHER_POWER * effect.exponent)
     other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
     return other if other.statistic < fit.statistic else fit
+
+
+def with_open_powers(bench: Bench, now: Settled) -> Settled:
+    """The same model, to the last digit, with the powers free by which springs stiffen.
+
+    A search holds them to those that it tried: what is known of a stiffness depends on what is known of its power.
+    """
+    open_ = tuple(
+        replace(effect, exponent=float(np.nextafter(effect.exponent, np.inf)))
+        if isinstance(effect, SpringStiffening) and effect.exponent in BESIDE_CUBIC
+        else effect
+        for effect in now.fit.effects
+    )
+    if open_ == now.fit.effects:
+        return now
+    return Settled(bench.fit(open_, now.noise, start=now.fit.parameters, known=now.fit.known), now.noise)
 
 
 def _from_a_power(bench: Bench, now: Settled, position: int, power: float) -> Fit:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.named import named_effect
+from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
@@ -25,3 +26,25 @@ def test_where_dry_friction_in_a_spring_slips_shows_only_where_it_does(laborator
     unsure = {name: p.std >= abs(p.value) for name, p in told.items()}
     assert unsure["slip"] == (not known)
     assert known or all(unsure.values())
+
+
+def test_the_power_that_a_search_tried_is_told_with_what_is_known_of_it(laboratory, nothing_missing):
+    """A spring that stiffens by a power of 2.015, fitted with 2: as sure of its size as of its power."""
+    _, start = nothing_missing
+    planted = [("spring_stiffening", "knee", [4000.0], {"exponent": 2.015})]
+    bench = laboratory.bench(laboratory.record(planted))
+    effects = (*start.fit.effects, make_effect("spring_stiffening", "knee", exponent=2.0))
+    now = Settled(bench.fit(effects, start.noise, start=start.fit.parameters), start.noise)
+    open_ = with_open_powers(bench, now)
+    assert with_open_powers(bench, start) is start
+    told = [
+        named_effect(bench, now.fit, len(effects) - 1, uncertainties(bench, each), 0.0, (), each.fit.free_shapes)
+        for each in (now, open_)
+    ]
+    held, free = ({p.name.removeprefix("knee.spring_stiffening_"): p for p in each.parameters} for each in told)
+    assert told[1].detail == effects[-1]
+    assert (held["exponent"].value, held["exponent"].std) == (free["exponent"].value, 0.0) == (2.0, 0.0)
+    assert held["power"].value == free["power"].value
+    for name, planted_value in (("power", 4000.0), ("exponent", 2.015)):
+        assert abs(free[name].value - planted_value) < 3.0 * free[name].std
+    assert free["power"].std > 3.0 * held["power"].std

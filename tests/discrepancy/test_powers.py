@@ -1,4 +1,4 @@
-"""Saturation by another power than a cube."""
+"""Saturation by another power than a cube, and springs that stiffen by a power of their own."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.effects import make_effect
 
 
 def saturated(laboratory, coefficient, exponent, *others):
@@ -67,3 +68,21 @@ def test_what_another_effect_leaves_speaks_for_no_other_power(laboratory, monkey
 
     monkeypatch.setattr(powers, "settle_again", settled)
     assert with_their_powers(bench, cube, len(bench.effects)) is cube
+
+
+@pytest.mark.parametrize(("planted", "held"), [(2.0, True), (2.2, False)])
+def test_a_spring_stiffens_by_its_own_power_where_that_is_told_from_the_one_tried(laboratory, planted, held):
+    effect = make_effect("spring_stiffening", "knee", exponent=2.0)
+    bench = laboratory.bench(laboratory.record([(effect.name, "knee", [4000.0], {"exponent": planted})]))
+    start = settle(bench, bench.effects)
+    fit = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
+    tried = settle_again(bench, fit)
+    now = with_their_powers(bench, tried, len(bench.effects))
+    assert (now is tried) is held
+    assert (now.fit.effects[-1] == effect) is held
+    if not held:
+        free = next(k for k, (position, _) in enumerate(now.fit.free_shapes) if position == len(now.fit.effects) - 1)
+        std = 3.5 * now.fit.std(len(now.fit.columns) + free)
+        assert now.fit.effects[-1].exponent == pytest.approx(planted, abs=3.0 * std)
+        assert std < 0.05
+        assert now.fit.statistic < 1.2 * now.fit.dof
