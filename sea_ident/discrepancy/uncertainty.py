@@ -1,14 +1,26 @@
 """Standard deviations of what a diagnosis tells of an effect."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.free_shapes import distance, moved_within
 from sea_ident.discrepancy.judge import flat_steps
+from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.settle import Settled
 
 FEWEST_STEPS = 5
 """Steps between periods from which on their own scatter says something."""
+
+BENDS = 0.2
+"""Standard deviation of a shape, of its logarithm or as a share of its range, from which on what the other values are
+along it is no straight line any more [-]."""
+
+MOST_DOUBLINGS = 4
+"""How often the way along such a shape is made twice as long while the fit stays as good."""
 
 
 def uncertainties(bench: Bench, now: Settled) -> FloatArray:
@@ -16,17 +28,51 @@ def uncertainties(bench: Bench, now: Settled) -> FloatArray:
 
     By the noise floor, which is one for all phases of a period, or by how the periods themselves scatter along a
     parameter, where that is more: friction that differs from pass to pass gathers at reversals, and there is friction
-    found. What the model leaves beyond noise makes both larger in proportion (Birge, The calculation of errors by the
-    method of least squares, Physical Review 40, 1932).
+    found. Along a shape of what was found that is hardly known, how far values go while the fit stays as good (the
+    profile of the likelihood). What the model leaves beyond noise makes all of it larger in proportion (Birge, The
+    calculation of errors by the method of least squares, Physical Review 40, 1932).
 
     Args:
         bench: the recording.
         now: the model.
     """
     fit, steps = now.fit, flat_steps(bench, now)
-    stds = np.linalg.norm(fit.covariance_factor, axis=1)
+    plain = np.linalg.norm(fit.covariance_factor, axis=1)
+    stds = plain.copy()
     if len(steps) >= FEWEST_STEPS:
         scatter = np.sqrt(np.mean((steps @ fit.basis @ fit.step_factor.T) ** 2, axis=0))
         noise = np.linalg.norm(fit.step_factor, axis=1)
         stds *= np.maximum(np.divide(scatter, noise, out=np.ones_like(noise), where=noise > 0.0), 1.0)
-    return np.asarray(np.sqrt(fit.unit) * stds, dtype=np.float64)
+    count, unit = len(fit.columns), fit.unit
+    told = np.asarray(np.sqrt(unit) * stds, dtype=np.float64)
+    for k, (position, _) in enumerate(fit.free_shapes, start=count):
+        if position < len(bench.effects) or not BENDS < told[k] < np.inf:
+            continue
+        for way, other in _as_good(bench, now, k - count, told[k], unit * (stds[k] / plain[k]) ** 2):
+            told[:count] = np.maximum(told[:count], np.abs(other.values - fit.values))
+            told[k] = max(told[k], way)
+    return told
+
+
+def _as_good(bench: Bench, now: Settled, number: int, step: float, rise: float) -> Iterator[tuple[float, Fit]]:
+    """Models with a shape elsewhere that are possible and fit as well, both ways, and how far away it is.
+
+    Args:
+        bench: the recording.
+        now: the model.
+        number: of the shape among those that are free.
+        step: to begin with, a standard deviation of the shape.
+        rise: of the statistic up to which a model fits as well.
+    """
+    fit, (position, shape) = now.fit, now.fit.free_shapes[number]
+    for sign in (-1.0, 1.0):
+        last = fit.effects
+        for doubling in range(MOST_DOUBLINGS):
+            way = 2.0**doubling * step
+            effects = moved_within(fit.effects, position, shape, sign * way)
+            if effects == last:  # the end of its range
+                break
+            last, other = effects, bench.fit(effects, now.noise, start=fit.parameters, tangents=False, known=fit.known)
+            if other.statistic - fit.statistic > rise or not physical(bench, other, position):
+                break
+            yield abs(distance(fit.effects[position], effects[position], shape)), other

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sea_ident.discrepancy.uncertainty as module
+from sea_ident.discrepancy.named import named_effect
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.uncertainty import uncertainties
@@ -97,3 +98,23 @@ def test_what_a_model_leaves_makes_it_less_sure(rippled, monkeypatch):
     assert ratio > 2.0
     told = uncertainties(bench, Settled(fit, start.noise))
     np.testing.assert_allclose(told, ratio**0.5 * np.linalg.norm(fit.covariance_factor, axis=1))
+
+
+def test_along_a_shape_that_is_hardly_known_values_are_as_unsure_as_they_go(laboratory, monkeypatch):
+    """Friction that hardly varies over the turn of a joint fits with any order, and with amounts that follow it."""
+    planted = {"sine": 0.2, "cosine": -0.15, "order": 1.0}
+    name = "position_dependent_friction"
+    amounts = [planted["sine"], planted["cosine"]]
+    bench = laboratory.bench(laboratory.record([(name, "knee", amounts, {"order": planted["order"]})]))
+    start = settle(bench, bench.effects)
+    model = bench.anchored((*start.fit.effects, make_effect(name, "knee", order=5.0)), start.fit.parameters)
+    now = Settled(bench.fit(model, start.noise, start=start.fit.parameters), start.noise)
+    straight, profile = [], []
+    for bends, told in ((np.inf, straight), (module.BENDS, profile)):
+        monkeypatch.setattr(module, "BENDS", bends)
+        found = named_effect(bench, now.fit, len(model) - 1, uncertainties(bench, now), 0.0, ())
+        parameters = {p.name.removeprefix(f"knee.{name}_"): p for p in found.parameters}
+        told.extend(abs(parameters[key].value - value) / parameters[key].std for key, value in planted.items())
+    assert max(straight) > 5.0
+    assert max(profile) < 2.0
+    assert now.fit.statistic < 1.2 * now.fit.dof
