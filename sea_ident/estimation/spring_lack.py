@@ -29,25 +29,28 @@ OWN = 1e-6
 """Part of a column beyond the law, in energy, below which the two are the same [-]."""
 
 
-def beside_the_law(motion: Motion, joint: int, zero: float) -> dict[str, FloatArray]:
+def beside_the_law(motion: Motion, joint: int, zero: float, unit: str = "rad") -> dict[str, FloatArray]:
     """(N, k) columns of what a spring may have beside its law, by the name of the effect.
 
     Args:
         motion: (N, n), as the bodies and the motor move.
         joint: number of the joint.
         zero: difference of the zeros of theta and q [rad] or [m].
+        unit: of both; what slides has no eccentric encoder.
     """
     deflection, q, dq = motion.deflection[:, joint] - zero, motion.q[:, joint], motion.dq[:, joint]
     slips = [hysteresis_column(deflection, max(slip * float(np.std(deflection)), 1e-300)) for slip in SLIPS]
     turn = max(TURN * float(np.std(dq)), 1e-300)
-    return {
+    found = {
         SpringOffset.name: np.ones((len(dq), 1)),
         # a cubic law about another zero
         EncoderOffset.name: np.column_stack([np.ones(len(dq)), deflection**2]),
         LinkFriction.name: np.column_stack([dq, smooth_sign(dq, turn)]),
         SpringHysteresis.name: np.column_stack(slips),
-        EncoderEccentricity.name: np.column_stack([np.cos(q), np.sin(q)]),
     }
+    if unit == "rad":
+        found[EncoderEccentricity.name] = np.column_stack([np.cos(q), np.sin(q)])
+    return found
 
 
 def spring_lack(

@@ -34,8 +34,8 @@ class SpringLack:
 
     Attributes:
         effects: names of effects at the joint, what takes the most first.
-        rms_residual: of the spring torque beside them [N m].
-        stiffness: K1 beside them [N m/rad].
+        rms_residual: of the spring torque beside them [N m] or [N].
+        stiffness: K1 beside them [N m/rad] or [N/m].
     """
 
     effects: tuple[str, ...]
@@ -83,8 +83,8 @@ class SpringResult:
         full_covariance: (3 + k, 3 + k) of K1, K3, D and the values of all terms; empty without terms.
         noise: rms of the noise of the mean spring torque less the law, by the scatter of the periods; None without
             periods [N m] or [N].
-        misfit: (3, 3) part of `covariance` that counts what the law leaves beyond its noise as random; empty where it
-            leaves no more than noise.
+        misfit: (3, 3) part of `covariance` that counts what the law leaves beyond its noise: as random, and how far off
+            what would take most of it puts the law; empty where it leaves no more than noise.
         lack: what would take most of that; None where nothing simple does, or nothing is left.
     """
 

@@ -257,7 +257,7 @@ def _one_spring(data: _SpringData, unknown_zero: bool) -> SpringResult:
         misfit = spring_misfit(left, law_inverse, whole, data.rows, data.uncertainty, data.harmonics, repeated)
         if misfit.covariance is not None:
             lacking = misfit.covariance
-            beside = beside_the_law(motion, joint, zero)
+            beside = beside_the_law(motion, joint, zero, data.unit)
             found = spring_lack(values, left.mean(axis=0), inverse, design, beside, misfit.noise, data.harmonics)
             if found is not None:
                 lack, shift = found

@@ -57,6 +57,10 @@ def test_an_effect_alone_is_named_and_the_law_beside_it_is_the_true_one(bent, ef
     assert lack.stiffness == pytest.approx(LAW[0], rel=1e-6)
 
 
+def test_what_slides_has_no_eccentric_encoder(bent):
+    assert beside_the_law(bent, 0, 0.0).keys() - beside_the_law(bent, 0, 0.0, "m").keys() == {"encoder_eccentricity"}
+
+
 def test_two_effects_are_named_the_larger_first(bent):
     beside = beside_the_law(bent, 0, 0.0)
     beyond = 0.5 * beside["spring_offset"][:, 0] + beside["link_friction"] @ np.array([0.3, 0.8])
