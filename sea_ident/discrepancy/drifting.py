@@ -28,6 +28,10 @@ from sea_ident.effects.load import MotorLoadEffect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.robot import Robot
 
+FORM = 0.02
+"""Share of what a trend explains that another drift must explain beyond it: how columns change with what drifts is left
+out here, and of a large trend that is more than noise [-]."""
+
 
 @dataclass(frozen=True)
 class Drifting(DriftEffect):
@@ -105,7 +109,7 @@ def drifting(
             continue
         first, *gains = _Drifts(bench, now, temperature, own).gains(trend, others)
         best = int(np.argmax(gains))
-        if gains[best] - first > EQUALLY_GOOD:
+        if gains[best] - first > max(EQUALLY_GOOD, FORM * first):
             named, drifts_at = trend.effect, own[best].joint
             found.append(UnnamedDrift(named.name, named.joint, own[best].name, 0.0, fit.solution, drifts_at=drifts_at))
     if trends.unnamed and not trends.trends and sized:

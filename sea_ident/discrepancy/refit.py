@@ -25,7 +25,7 @@ from sea_ident.effects.torque_delay import TorqueDelay
 AT_ONCE = 2
 """Candidates that are refitted at a time, whether there are cores for them or not: so the outcome is the same."""
 
-LARGE_AMOUNT = 0.1
+LARGE_AMOUNT = 0.05
 """Share of its range from which on an estimate of an amount is beyond the reach of its tangent [-]: it is begun ..."""
 
 SMALLER = 0.1

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import sea_ident.discrepancy.drifting as drifting_module
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import conclude
@@ -63,6 +64,18 @@ def test_a_drift_of_the_library_keeps_its_name_beside_what_was_found(laboratory,
     bench, _, now, trends = compared(laboratory, planted, found)
     assert [(t.effect.name, t.effect.joint) for t in trends.trends] == [drift[:2]]
     assert drifting(bench, now, trends) == ()
+
+
+@pytest.mark.parametrize(("gains", "other"), [((21800.0, 21850.0), 0), ((21800.0, 24000.0), 1), ((40.0, 60.0), 1)])
+def test_a_large_drift_keeps_its_name_where_another_explains_little_more(nothing_missing, monkeypatch, gains, other):
+    """It is seen so well that how its columns are taken is more than noise."""
+    bench, start = nothing_missing
+    found = bench.anchored((*start.fit.effects, make_effect("torque_constant", "hip")), start.fit.parameters)
+    now = settle_again(bench, bench.fit(found, start.noise, start=start.fit.parameters))
+    drift = make_effect("torque_constant_drift", "hip")
+    trend = Trend(drift, np.array([-0.1]), np.array([0.002]), gains[0], 0.0, 0.03)
+    monkeypatch.setattr(drifting_module._Drifts, "gains", lambda *_: list(gains))
+    assert len(drifting(bench, now, TrendTest(0.0, (trend,), False))) == other
 
 
 @pytest.mark.scenario
