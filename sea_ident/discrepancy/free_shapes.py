@@ -16,7 +16,7 @@ from sea_ident.effects.spring_stiffening import BESIDE_CUBIC, CUBIC, SpringStiff
 from sea_ident.effects.state import Side
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
 
-IN_SIGHT = 5.0
+IN_SIGHT = 2.5
 """Speed, over that at which friction turns over, from which on a sample does not tell the one from any lower [-]."""
 
 SHAPES_THAT_STAY = {

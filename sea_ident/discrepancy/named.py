@@ -11,6 +11,7 @@ from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingPa
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
+from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
@@ -20,6 +21,9 @@ from sea_ident.effects import Effect, Shape, Side
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.estimation.spring_untold import told_by_rest
 from sea_ident.estimation.springs import spring_columns
+
+SAME = 1e-12
+"""Smallest to largest eigenvalue of products of normalised columns below which these are the same but for rounding."""
 
 
 def named_effects(
@@ -73,12 +77,15 @@ def named_effect(
     """
     effect, counts = fit.effects[position], bench.counts(fit.effects)
     own = range(sum(counts[:position]), sum(counts[: position + 1]))
-    seen = np.any(bench.column_spectra(effect, fit.effects), axis=(0, 1))  # of a column of zeros nothing is known
-    values = fit.values[own.start : own.stop]
+    spectra = bench.column_spectra(effect, fit.effects)
+    seen = np.any(spectra, axis=(0, 1))  # of a column of zeros nothing is known
+    values, unseen = _as_seen(spectra, fit.values[own.start : own.stop])
     by_rest = _told_by_rest(bench, fit, effect, values)
     parameters = [
-        MissingParameter(fit.columns[i].name, float(fit.values[i]), float(np.hypot(stds[i], more)), fit.columns[i].unit)
-        for i, more, shown in zip(own, by_rest, seen, strict=True)
+        MissingParameter(
+            fit.columns[i].name, float(value), float(np.linalg.norm([stds[i], *more])), fit.columns[i].unit
+        )
+        for i, value, *more, shown in zip(own, values, by_rest, unseen, seen, strict=True)
         if shown
     ]
     at_rest = bool(len(values)) and bool(np.all(by_rest > 0.0))
@@ -93,8 +100,31 @@ def named_effect(
         p_value=p_value,
         alternatives=tuple(replace(each, fit=None) for each in alternatives),
         detail=effect,
-        values=tuple(float(fit.values[i]) for i in own),
+        values=tuple(map(float, values)),
     )
+
+
+def _as_seen(spectra: ComplexArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The smallest values (k,) that do the same, and by how much they may be off for what columns have in common.
+
+    A force along the axis of the only joint that it could move is not seen, nor is its share in each component told.
+
+    Args:
+        spectra: (H, E, k) columns of an effect.
+        values: (k,) of them.
+    """
+    flat = spectra.reshape(-1, spectra.shape[2])
+    norms = np.linalg.norm(flat, axis=0)
+    shown = norms > 0.0
+    unit = flat[:, shown] / norms[shown]
+    strength, directions = np.linalg.eigh(np.real(unit.conj().T @ unit))
+    nothing = directions[:, strength <= SAME * strength[-1:]] / norms[shown, None]
+    least, unseen = values.copy(), np.zeros(len(values))
+    if nothing.size:
+        along = np.linalg.qr(nothing)[0]
+        least[shown] -= along @ (along.T @ values[shown])
+        unseen[shown] = np.linalg.norm(along, axis=1) * np.linalg.norm(least[shown])
+    return least, unseen
 
 
 def _told_by_rest(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) -> FloatArray:

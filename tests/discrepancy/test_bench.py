@@ -108,7 +108,7 @@ def test_friction_that_turns_over_out_of_sight_is_brought_where_samples_tell_of_
     slowest = {("hip", friction.side): 0.004, ("hip", link.side): 0.02, ("knee", friction.side): np.inf}
     found = turning_in_sight(sharp, slowest)
     # what is anchored in the friction of the motor goes with it; nothing slow is compared at the knee
-    assert [effect.smoothing for effect in found] == pytest.approx([8e-4, 8e-4, 4e-3, 2e-4])
+    assert [effect.smoothing for effect in found] == pytest.approx([1.6e-3, 1.6e-3, 8e-3, 2e-4])
     assert turning_in_sight(sharp, slowest, only=2)[:2] == tuple(sharp[:2])
     assert turning_in_sight((friction, loss, link), slowest) == (friction, loss, link)
 
