@@ -113,9 +113,11 @@ def _as_seen(spectra: ComplexArray, values: FloatArray) -> tuple[FloatArray, Flo
         spectra: (H, E, k) columns of an effect.
         values: (k,) of them.
     """
-    flat = spectra.reshape(-1, spectra.shape[2])
+    flat = np.concatenate(spectra)
     norms = np.linalg.norm(flat, axis=0)
     shown = norms > 0.0
+    if not np.any(shown):  # errors of sensors have no columns
+        return values, np.zeros(len(values))
     unit = flat[:, shown] / norms[shown]
     strength, directions = np.linalg.eigh(np.real(unit.conj().T @ unit))
     nothing = directions[:, strength <= SAME * strength[-1:]] / norms[shown, None]

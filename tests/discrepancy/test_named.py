@@ -69,3 +69,7 @@ def test_what_columns_have_in_common_is_told_of_none_of_them():
     same, known = _as_seen(other, force)
     assert (same == force).all()
     assert not known.any()
+    for nothing in (spectra[:, :, :0], 0.0 * spectra):
+        found, off = _as_seen(nothing, force[: nothing.shape[2]])
+        assert (found == force[: nothing.shape[2]]).all()
+        assert not off.any()
