@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.named import _as_seen, named_effect
+from sea_ident.discrepancy.named import _as_seen, named_effect, named_effects
 from sea_ident.discrepancy.powers import with_open_powers
+from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
@@ -48,6 +49,8 @@ def test_the_power_that_a_search_tried_is_told_with_what_is_known_of_it(laborato
     for name, planted_value in (("power", 4000.0), ("exponent", 2.015)):
         assert abs(free[name].value - planted_value) < 3.0 * free[name].std
     assert free["power"].std > 3.0 * held["power"].std
+    (both,) = named_effects(bench, Selection(start, now, 1, (0.0,)), {}, None)
+    assert both.parameters == told[1].parameters
 
 
 def test_what_columns_have_in_common_is_told_of_none_of_them():

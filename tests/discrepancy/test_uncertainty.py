@@ -117,4 +117,10 @@ def test_along_a_shape_that_is_hardly_known_values_are_as_unsure_as_they_go(labo
         told.extend(abs(parameters[key].value - value) / parameters[key].std for key, value in planted.items())
     assert max(straight) > 5.0
     assert max(profile) < 2.0
+    assert profile[-1] < 0.7 * straight[-1]
+    # none of them counts where it is not possible
+    monkeypatch.setattr(module, "physical", lambda *_: False)
+    possible = uncertainties(bench, now)
+    monkeypatch.setattr(module, "BENDS", np.inf)
+    np.testing.assert_array_equal(possible, uncertainties(bench, now))
     assert now.fit.statistic < 1.2 * now.fit.dof

@@ -99,11 +99,13 @@ def test_what_would_make_the_stiffness_negative_explains_nothing(bent):
 
 
 def test_what_the_law_has_already_is_none_of_it(bent):
-    """Nothing that lies in the law can be beside it: it would be told with any amount."""
-    columns = spring_columns(bent, 0, 0.0)
-    inverse, left = np.linalg.pinv(columns), np.sin(2.0 * np.pi * 17.0 * bent.time / 2.0)
-    again = {"again": columns[:, :1] * (1.0 + 1e-9)}
-    assert spring_lack(LAW, left, inverse, columns, again, 1e-6) is None
+    """What hardly lies beside the law would explain anything by an amount without end."""
+    columns, wave = spring_columns(bent, 0, 0.0), np.sin(2.0 * np.pi * 17.0 * bent.time / 2.0)
+    inverse = np.linalg.pinv(columns)
+    left = wave - columns @ (inverse @ wave)
+    for share, told in ((1e-4, False), (1e-2, True)):
+        again = columns[:, :1] / np.linalg.norm(columns[:, 0]) - share * left[:, None] / np.linalg.norm(left)
+        assert (spring_lack(LAW, left, inverse, columns, {"again": again}, 1e-6) is not None) is told
 
 
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
