@@ -17,7 +17,8 @@ from sea_ident.effects.state import Side
 from sea_ident.effects.torque_saturation import CUBE, TorqueSaturation
 
 IN_SIGHT = 2.5
-"""Speed, over that at which friction turns over, from which on a sample does not tell the one from any lower [-]."""
+"""Least speed that is compared, over that at which friction turns over, from which on a step may not lead back [-]: it
+did not from 5, and did from 3."""
 
 SHAPES_THAT_STAY = {
     "asymmetric_spring": ("kink",),

@@ -19,11 +19,8 @@ from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import Effect, Shape, Side
 from sea_ident.effects.memory import MemoryEffect
-from sea_ident.estimation.spring_untold import told_by_rest
+from sea_ident.estimation.spring_untold import told_by_rest, untold
 from sea_ident.estimation.springs import spring_columns
-
-SAME = 1e-12
-"""Smallest to largest eigenvalue of products of normalised columns below which these are the same but for rounding."""
 
 
 def named_effects(
@@ -79,7 +76,7 @@ def named_effect(
     own = range(sum(counts[:position]), sum(counts[: position + 1]))
     spectra = bench.column_spectra(effect, fit.effects)
     seen = np.any(spectra, axis=(0, 1))  # of a column of zeros nothing is known
-    values, unseen = _as_seen(spectra, fit.values[own.start : own.stop])
+    values, unseen = _as_seen(effect, spectra, fit.values[own.start : own.stop])
     by_rest = _told_by_rest(bench, fit, effect, values)
     parameters = [
         MissingParameter(
@@ -104,13 +101,14 @@ def named_effect(
     )
 
 
-def _as_seen(spectra: ComplexArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _as_seen(effect: Effect, spectra: ComplexArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The smallest values (k,) that do the same, and by how much they may be off for what columns have in common.
 
     A force along the axis of the only joint that it could move is not seen, nor is its share in each component told.
 
     Args:
-        spectra: (H, E, k) columns of an effect.
+        effect: the effect.
+        spectra: (H, E, k) its columns.
         values: (k,) of them.
     """
     flat = np.concatenate(spectra)
@@ -119,8 +117,8 @@ def _as_seen(spectra: ComplexArray, values: FloatArray) -> tuple[FloatArray, Flo
     if not np.any(shown):  # errors of sensors have no columns
         return values, np.zeros(len(values))
     unit = flat[:, shown] / norms[shown]
-    strength, directions = np.linalg.eigh(np.real(unit.conj().T @ unit))
-    nothing = directions[:, strength <= SAME * strength[-1:]] / norms[shown, None]
+    alike = untold(str(effect.joint), np.real(unit.conj().T @ unit), [effect.name] * unit.shape[1])
+    nothing = alike / norms[shown, None]
     least, unseen = values.copy(), np.zeros(len(values))
     if nothing.size:
         along = np.linalg.qr(nothing)[0]

@@ -55,24 +55,24 @@ def test_the_power_that_a_search_tried_is_told_with_what_is_known_of_it(laborato
 
 def test_what_columns_have_in_common_is_told_of_none_of_them():
     """As of a force along the axis of the only joint that it could move: the least is told, and that it may be off."""
-    rng = np.random.default_rng(3)
+    rng, push = np.random.default_rng(3), make_effect("external_force", "hip")
     axis = np.array([0.3, -0.6, 0.2])
     across = np.linalg.svd(axis[None])[2][1:]
     spectra = (rng.standard_normal((20, 2, 2)) + 1j * rng.standard_normal((20, 2, 2))) @ across
     force = np.array([4.0, 1.0, -2.0])
-    least, unseen = _as_seen(spectra, force)
+    least, unseen = _as_seen(push, spectra, force)
     np.testing.assert_allclose(spectra @ least, spectra @ force, atol=1e-12)
     assert least @ axis == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(unseen, np.abs(axis) / np.linalg.norm(axis) * np.linalg.norm(least), rtol=1e-9)
     # with a column that is not seen at all, and with columns that have nothing in common
-    hidden, none = _as_seen(np.concatenate([spectra, 0.0 * spectra[:, :, :1]], axis=2), np.array([*force, 7.0]))
+    hidden, none = _as_seen(push, np.concatenate([spectra, 0.0 * spectra[:, :, :1]], axis=2), np.array([*force, 7.0]))
     np.testing.assert_allclose(hidden, [*least, 7.0], rtol=1e-9)
     assert none[3] == 0.0
     other = spectra + 1e-3 * rng.standard_normal(spectra.shape)
-    same, known = _as_seen(other, force)
+    same, known = _as_seen(push, other, force)
     assert (same == force).all()
     assert not known.any()
     for nothing in (spectra[:, :, :0], 0.0 * spectra):
-        found, off = _as_seen(nothing, force[: nothing.shape[2]])
+        found, off = _as_seen(push, nothing, force[: nothing.shape[2]])
         assert (found == force[: nothing.shape[2]]).all()
         assert not off.any()
