@@ -15,6 +15,7 @@ from typing import Any
 
 from sea_ident.effects.acting import Action, SimulationState
 from sea_ident.effects.base import Anchor, Column, Effect, JointEffect, Shape, smooth_sign
+from sea_ident.effects.load import Term
 from sea_ident.effects.signal import corrected_motion, measured_signals
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
@@ -113,7 +114,16 @@ def effect_from_dict(record: Mapping[str, Any]) -> Effect:
     shape = record.get("shape") or {}
     if not isinstance(shape, Mapping):
         raise EffectError(f"effect {record['effect']!r}: shape is not a mapping")
+    if "terms" in shape:
+        shape = {**shape, "terms": tuple(_term_from_dict(term) for term in shape["terms"])}
     return make_effect(str(record["effect"]), record.get("joint"), **shape)
+
+
+def _term_from_dict(record: Mapping[str, Any]) -> Term:
+    effect, values = effect_from_dict(record), record.get("values")
+    if not isinstance(values, list) or not all(isinstance(value, Real) for value in values):
+        raise EffectError(f"effect {effect.title!r} in the load of another: values {values!r} is not a list of numbers")
+    return Term(effect, tuple(float(value) for value in values))
 
 
 def base_effects(robot: Robot) -> tuple[Effect, ...]:

@@ -20,7 +20,7 @@ class SimulationState:
         theta: (n,) motor positions after the gear.
         dtheta: (n,) motor velocities after the gear.
         tau_spring: (n,) torques from the motor side onto the links: of the springs, or at a rigid joint what the
-            bodies need, where a `LoadEffect` asks for it [N m].
+            bodies and all else that acts on the links need, where a `LoadEffect` asks for it [N m].
         tau_motor: (n,) commanded motor torques at the joint side [N m].
         elapsed: time since the last step that was accepted [s].
     """

@@ -1,19 +1,48 @@
 """Effects that depend on the torque that a joint carries."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, JointAction
-from sea_ident.effects.base import Anchor, Effect, smooth_sign
+from sea_ident.effects.base import Anchor, Effect, JointEffect, smooth_sign
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 from sea_ident.robot.rotor_columns import own_rotor_row
+
+SPRING_LAW = ("spring_stiffness", "spring_stiffening", "spring_damping")
+MOTOR_FRICTION = ("viscous_friction", "coulomb_friction")
+"""Parameters that an effect by load has as numbers of its own."""
+
+CARRIED = (Side.LINK, Side.BOTH)
+"""Sides of what a rigid joint carries beside the bodies of the model."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect of a model with the values of its parameters.
+
+    Attributes:
+        effect: the effect.
+        values: (k,) values of its columns.
+    """
+
+    effect: Effect
+    values: tuple[float, ...]
+
+    def link(self, state: State, index: int) -> FloatArray:
+        """(N,) what it adds to the link row of a joint."""
+        return np.asarray(self.effect.evaluate(state).link[:, index] @ np.array(self.values), dtype=np.float64)
+
+    def motor(self, state: State, index: int) -> FloatArray:
+        """(N,) what it adds to the motor row of a joint."""
+        return np.asarray(self.effect.evaluate(state).motor[:, index] @ np.array(self.values), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -33,6 +62,7 @@ class LoadEffect(Effect):
         viscous: friction of its motor [N m s/rad].
         coulomb: friction of its motor [N m].
         inertial: (10 b,) standard inertial parameters of all links, for the load of a rigid joint.
+        terms: what else the model has in its spring, on the links that a rigid joint carries, and at its motor.
     """
 
     smoothing: float = 0.01
@@ -43,6 +73,7 @@ class LoadEffect(Effect):
     viscous: float | None = None
     coulomb: float | None = None
     inertial: Sequence[float] = ()
+    terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inertial", tuple(float(value) for value in self.inertial))
@@ -69,6 +100,7 @@ class LoadEffect(Effect):
             viscous=anchor.value(f"{joint}.viscous_friction"),
             coulomb=anchor.value(f"{joint}.coulomb_friction"),
             reflected_inertia=_reflected_inertia(robot, joint, anchor),
+            terms=tuple(_terms(anchor, self)),
         )
         if known.elastic:
             return replace(
@@ -97,25 +129,26 @@ class LoadEffect(Effect):
         return stiffness * deflection + (cubic or 0.0) * deflection**3 + (damping or 0.0) * rate
 
     def load(self, state: State) -> FloatArray:
-        """(N,) torque from the motor side onto the link [N m]: of the spring, or at a rigid joint of the bodies."""
+        """(N,) torque from the motor side onto the link [N m]: of the spring, or of all that a rigid joint carries."""
         robot, i = state.robot, state.robot.index(self.at)
         if robot.joints[i].elastic:
-            return self.spring_load(robot, state.motion.deflection[:, i], state.motion.deflection_rate[:, i])
-        return state.body_torque(np.array(self.inertial) if len(self.inertial) else robot.inertial_parameters)[:, i]
+            law = self.spring_load(robot, state.motion.deflection[:, i], state.motion.deflection_rate[:, i])
+            return sum((term.motor(state, i) for term in self._of(Side.SPRING)), law)
+        inertial = np.array(self.inertial) if len(self.inertial) else robot.inertial_parameters
+        return sum((term.link(state, i) for term in self._of(*CARRIED)), state.body_torque(inertial)[:, i])
 
     def motor_torque(self, state: State) -> FloatArray:
-        """(N,) torque of the motor: load, inertia of the rotor, friction [N m]."""
+        """(N,) torque of the motor: load, inertia of the rotor, friction, and what else the model has there [N m]."""
         robot, motion = state.robot, state.motion
         i = robot.index(self.at)
         actuator = robot.joints[i].actuator
-        inertia, viscous, coulomb = self.reflected_inertia, self.viscous, self.coulomb
+        viscous, coulomb = self.viscous, self.coulomb
         if actuator is not None:
-            inertia = (actuator.rotor_inertia or 0.0) * actuator.gear_ratio**2 if inertia is None else inertia
             viscous = actuator.viscous_friction if viscous is None else viscous
             coulomb = actuator.coulomb_friction if coulomb is None else coulomb
         friction = (viscous or 0.0) * motion.dtheta[:, i] + (coulomb or 0.0) * self.sign(motion.dtheta[:, i])
-        torque: FloatArray = self.load(state) + (inertia or 0.0) * motion.ddtheta[:, i] + friction
-        return torque
+        torque: FloatArray = self.load(state) + self.rotor_torque(state) + friction
+        return sum((term.motor(state, i) for term in self._of(Side.MOTOR)), torque)
 
     def rotor_torque(self, state: State) -> FloatArray:
         """(N,) torque that the rotor of the joint takes for itself by its inertia [N m]."""
@@ -133,12 +166,43 @@ class LoadEffect(Effect):
         """Smoothed sign of a velocity."""
         return smooth_sign(velocity, self.smoothing)
 
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can hold, with its terms in the same form."""
+        record = super().to_dict()
+        record["shape"]["terms"] = [{**term.effect.to_dict(), "values": list(term.values)} for term in self.terms]
+        return record
+
+    def _of(self, *sides: Side) -> Iterator[Term]:
+        return (term for term in self.terms if term.effect.side in sides)
+
 
 def _reflected_inertia(robot: Robot, joint: str, anchor: Anchor) -> float:
     actuator = robot.joints[robot.index(joint)].actuator
     if actuator is None:
         return 0.0
     return anchor.value(f"{actuator.rotor_group}.rotor_inertia") * actuator.gear_ratio**2
+
+
+def _terms(anchor: Anchor, own: LoadEffect) -> Iterator[Term]:
+    """What else a model has where an effect by load acts, and its load and the torque of its motor are made of."""
+    robot, joint = anchor.robot, own.at
+    elastic = robot.joints[robot.index(joint)].elastic
+    carried = (Side.SPRING,) if elastic else CARRIED
+    has = {f"{joint}.{name}" for name in (*SPRING_LAW, *MOTOR_FRICTION)} | set(robot.inertial_names)
+    has |= set(robot.rotor_groups)
+    for effect in anchor.effects:
+        if effect.side not in (*carried, Side.MOTOR) or effect.name == own.name or isinstance(effect, TrendEffect):
+            continue
+        if effect.joint != joint and (effect.side is Side.MOTOR or isinstance(effect, JointEffect)):
+            continue
+        names = [column.name for column in effect.columns(robot)]
+        values = tuple(anchor.value(name) for name in names)
+        if not has.isdisjoint(names) or not any(values):
+            continue
+        if isinstance(effect, LoadEffect):
+            # its own load is all that it follows: two that follow the torque of their motor would follow each other
+            effect = replace(effect, terms=tuple(effect._of(*carried)))
+        yield Term(effect, values)
 
 
 class MotorLoadEffect(LoadEffect):

@@ -72,11 +72,17 @@ class PlantedTorques:
         coordinates = motor_coordinates(robot)
         self._motor, self._sides = np.array(coordinates, dtype=np.intp), list(enumerate(coordinates))
         acting = [p for p in effects if p.effect.side is not Side.SENSOR and overrides(p.effect, "torque")]
-        hooks = [(p.effect.side is Side.SPRING, p.effect.torque(robot, p.values)) for p in acting]
-        # Springs first: the others may depend on the torque that they transmit.
-        self._joint_springs, self._springs = _by_kind([hook for spring, hook in hooks if spring], coordinates)
-        self._joint_others, self._others = _by_kind([hook for spring, hook in hooks if not spring], coordinates)
-        self._damping = [at for at in (*self._joint_springs, *self._joint_others) if at.action.of_speed]
+        hooks = [(p.effect.side, p.effect.torque(robot, p.values)) for p in acting]
+        # Springs and links first: the others may depend on the torque that springs transmit and rigid joints carry.
+        self._joint_springs, self._springs = _by_kind([h for side, h in hooks if side is Side.SPRING], coordinates)
+        self._joint_links, self._links = _by_kind([h for side, h in hooks if side is Side.LINK], coordinates)
+        self._joint_others, self._others = _by_kind(
+            [h for side, h in hooks if side not in (Side.SPRING, Side.LINK)], coordinates
+        )
+        every = (*self._joint_springs, *self._joint_links, *self._joint_others)
+        self._damping = [at for at in every if at.action.of_speed]
+        self._on_robot = bool(self._springs or self._links or self._others)
+        self._rigid = ~np.array(robot.elastic, dtype=bool)
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
         self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
@@ -105,7 +111,7 @@ class PlantedTorques:
         state.tau_spring[:] = tau_spring
 
     def _act(self) -> list[float]:
-        """(size,) torques of what depends on the robot, at the state that is set; springs change its spring torques."""
+        """(size,) torques of what depends on the robot, at the state that is set, whose spring torques these change."""
         state, link, motor = self._state, self._link, self._torque
         link[:] = 0.0
         motor[:] = 0.0
@@ -113,6 +119,11 @@ class PlantedTorques:
             act(state, link, motor)
         if self._springs:
             state.tau_spring[:] -= link
+        if self._links:
+            before = link.copy()
+            for act in self._links:
+                act(state, link, motor)
+            state.tau_spring[self._rigid] += (link - before)[self._rigid]
         for act in self._others:
             act(state, link, motor)
         out = [0.0] * self._size
@@ -131,15 +142,19 @@ class PlantedTorques:
         tau_spring: list[float],
         out: list[float],
     ) -> None:
-        """Subtract the torques from the forces `out`, and add what acts in the springs to `tau_spring`."""
+        """Subtract the torques from the forces `out`, and add those in springs and on rigid joints to `tau_spring`."""
         instant = _Instant(max(time, self._begin), u.tolist(), w.tolist(), tau_motor, tau_spring)
         for at in self._joint_springs:
             tau_spring[at.i] -= at.action.on_link * at.add(instant, out)
-        if self._springs or self._others:
+        for at in self._joint_links:
+            amount = at.add(instant, out)
+            if self._rigid[at.i]:
+                tau_spring[at.i] += at.action.on_link * amount
+        if self._on_robot:
             self._set(time, elapsed, u, w, tau_motor, tau_spring)
             for i, torque in enumerate(self._act()):
                 out[i] -= torque
-            if self._springs:
+            if self._springs or self._links:
                 tau_spring[:] = self._state.tau_spring.tolist()
         for at in self._joint_others:
             at.add(instant, out)
@@ -159,7 +174,7 @@ class PlantedTorques:
             instant = _Instant(max(time, self._begin), u.tolist(), w.tolist(), tau_motor, tau_spring)
             for at in self._damping:
                 at.add_slopes(instant, slopes)
-        if self._springs or self._others:
+        if self._on_robot:
             n = len(self._link)
             self._set(time, 0.0, u, w, tau_motor, tau_spring)
             base = self._act()

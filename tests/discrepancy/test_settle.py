@@ -1,5 +1,7 @@
 """Models in the noise floor, and around the loads, that belong to them."""
 
+from dataclasses import replace
+
 import pytest
 
 from sea_ident.discrepancy.search import search
@@ -49,6 +51,29 @@ def test_a_search_ends_with_effects_that_stand(saturated):
     assert [(e.name, e.joint) for e in found.effects] == [("torque_saturation", "knee")]
     assert abs(off(found.final)) < 2.5
     assert anchored_in_itself(bench, found.final) is found.final
+
+
+@pytest.mark.parametrize(
+    ("followed", "true", "beside"),
+    [
+        ("directional_efficiency", 0.2, ("spring_hysteresis", "knee", [0.2, 0.1], {"slip": 0.01})),
+        ("torque_constant", -0.07, ("spring_offset", "knee", [2.0], {})),
+        ("torque_saturation", SATURATION, ("torque_offset", "knee", [-1.0], {})),
+    ],
+)
+def test_a_load_is_that_of_all_there_is_in_the_spring_and_at_the_motor(laboratory, followed, true, beside):
+    bench = laboratory.bench(laboratory.record([(followed, "knee", [true], {}), beside], seed=12))
+    start = settle(bench, bench.effects)
+    added = make_effect(followed, "knee"), make_effect(beside[0], "knee", **beside[3])
+    anchored = bench.anchored((*start.fit.effects, *added), start.fit.parameters)
+    fit = bench.refine(anchored, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    found = anchored_in_itself(bench, Settled(fit, bench.noise(fit))).fit
+    assert found.statistic < 1.2 * found.dof
+    own = next(k for k, c in enumerate(found.columns) if c.name == f"knee.{followed}")
+    assert abs(found.values[own] - true) < 2.5 * found.std(own)
+    alone = [replace(effect, terms=()) if hasattr(effect, "terms") else effect for effect in found.effects]
+    away = bench.fit(alone, bench.noise(found), start=found.parameters)
+    assert abs(away.values[own] - true) > 3.0 * away.std(own)
 
 
 def test_what_depends_on_nothing_stays_as_it_is(nothing_missing):

@@ -1,4 +1,5 @@
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -6,7 +7,17 @@ import pytest
 from plants import modest_series, ur10
 
 from sea_ident import SeaIdentError, build_regressor
-from sea_ident.effects import Column, JointEffect, Side, base_effects, make_effect, spring_effects
+from sea_ident.effects import (
+    Anchor,
+    Column,
+    JointEffect,
+    Side,
+    base_effects,
+    effect_from_dict,
+    make_effect,
+    spring_effects,
+)
+from sea_ident.regressor import model_columns
 from sea_ident.simulation import PlantedEffect, plant_from_robot, simulate
 from sea_ident.simulation.planted import PlantedTorques
 
@@ -66,6 +77,64 @@ def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet, loaded):
     regressor = build_regressor(robot, (*own, *effects), run.motion)
     np.testing.assert_allclose(regressor.sum @ psi, run.tau_motor, atol=1e-9)
     assert not np.any(run.tau_spring)
+
+
+def in_the_model(robot, planted, parameters):
+    """Effects that know each other's values, with the parameters of the whole model."""
+    own = (*base_effects(robot), *spring_effects(robot))
+    values = dict(zip([c.name for c in model_columns(robot, own)], parameters, strict=True))
+    for each in planted:
+        values |= dict(zip([c.name for c in each.effect.columns(robot)], each.values, strict=True))
+    effects = (*own, *(each.effect for each in planted))
+    for _ in range(2):  # what follows another must know what that follows
+        anchor = Anchor(robot, effects, values)
+        effects = tuple(effect.anchored(anchor) for effect in effects)
+    return effects, np.array([values[c.name] for c in model_columns(robot, effects)])
+
+
+BENT_SPRING = [("spring_stiffening", [90.0], {"exponent": 2.0}), ("asymmetric_spring", [30.0], {})]
+AT_MOTOR = [("torque_offset", [0.7], {}), ("stribeck_friction", [0.5], {}), ("directional_efficiency", [0.08], {})]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "others"),
+    [
+        ("load_dependent_friction", 0.05, [("spring_offset", [2.0], {})]),
+        ("directional_efficiency", 0.08, BENT_SPRING),
+        ("torque_saturation", 1e-4, [("spring_offset", [2.0], {})]),
+        ("torque_saturation", 1e-4, AT_MOTOR),
+        ("torque_saturation", 1e-4, [*BENT_SPRING, AT_MOTOR[-1]]),
+    ],
+)
+def test_what_follows_a_load_follows_all_that_the_model_has_there(leg, leg_series, quiet, exact, name, value, others):
+    planted = [PlantedEffect(make_effect(name, "knee"), np.array([value]))]
+    planted += [PlantedEffect(make_effect(n, "knee", **shape), np.array(values)) for n, values, shape in others]
+    run = simulate(leg, leg_series, periods=1, effects=planted, start=exact.motion, **quiet)
+    own = (*base_effects(leg), *spring_effects(leg))
+    effects, psi = in_the_model(leg, planted, plant_from_robot(leg).values_of(own))
+    knows = build_regressor(leg, effects, run.motion)
+    np.testing.assert_allclose(knows.motor @ psi, run.tau_motor, atol=1e-8)
+    assert tuple(effect_from_dict(json.loads(json.dumps(effect.to_dict()))) for effect in effects) == effects
+    without = [replace(effect, terms=()) if hasattr(effect, "terms") else effect for effect in effects]
+    assert np.abs(build_regressor(leg, without, run.motion).motor @ psi - run.tau_motor).max() > 1e-3
+
+
+def test_what_follows_the_load_of_a_rigid_joint_follows_all_that_the_joint_carries(quiet):
+    robot = ur10()
+    series = modest_series(robot)
+    load = np.array([1.5, *([0.0] * 9)])
+    planted = [
+        PlantedEffect(make_effect("load_dependent_friction", "elbow_joint"), np.array([0.1])),
+        PlantedEffect(make_effect("parallel_spring", "elbow_joint"), np.array([20.0, 3.0])),
+        PlantedEffect(make_effect("link_friction", "elbow_joint"), np.array([2.0, 4.0])),
+        PlantedEffect(make_effect("payload", "wrist_3_joint"), load),
+        PlantedEffect(make_effect("external_force", "wrist_1_joint"), np.array([3.0, -2.0, 5.0])),
+        PlantedEffect(make_effect("torque_offset", "elbow_joint"), np.array([2.0])),
+    ]
+    run = simulate(robot, series, periods=1, effects=planted, start=series.motion(np.zeros(1)), **quiet)
+    parameters = np.nan_to_num(plant_from_robot(robot).values_of(base_effects(robot)))
+    effects, psi = in_the_model(robot, planted, parameters)
+    np.testing.assert_allclose(build_regressor(robot, effects, run.motion).sum @ psi, run.tau_motor, atol=1e-8)
 
 
 def test_memory_moves_on_with_accepted_steps_only(leg, leg_series, quiet, exact):
