@@ -14,6 +14,7 @@ from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.side_by_side import side_by_side
 
 FAR = 6
@@ -90,8 +91,10 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         columns = max(len(final.fit.effects[position].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
         by_chance = max(p_value, scatter_p(steps, less.whitened - final.fit.whitened))
-        if by_chance <= FAMILY_LEVEL and torque_change(away, final.fit, less) >= SMALLEST_SHARE:
-            return False
+        if by_chance <= FAMILY_LEVEL:
+            visible = torque_change(away, final.fit, less) >= SMALLEST_SHARE
+            if visible or taken_up(away, less, final.fit, final.noise, position):
+                return False
         rest = bench.fit(others, selection.final.noise, start=less.parameters, tangents=False)
         return not lets_go_late(bench, rest, final.fit.effects[position])
 

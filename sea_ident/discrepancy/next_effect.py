@@ -27,9 +27,11 @@ from sea_ident.discrepancy.judge import (
     torque_change,
     torque_changes,
 )
+from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.physics import is_term, possible
 from sea_ident.discrepancy.refit import AT_ONCE, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.effects import Effect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
@@ -238,7 +240,7 @@ class _Trial:
         p_value = significance(gain, candidate.columns, self.tests, fit, noise)
         could_be = possible(bench, new, noise, -1)
         acceptable = could_be and p_value <= FAMILY_LEVEL and gain >= least
-        acceptable = acceptable and _acceptable(bench, fit, new, self.steps, self.smallest)
+        acceptable = acceptable and _acceptable(bench, fit, new, noise, self.steps, self.smallest)
         return _Outcome(new.solution, gain, p_value, could_be, acceptable)
 
 
@@ -274,13 +276,14 @@ def least_useful(bench: Bench, now: Settled) -> float:
     return max(usual, least)
 
 
-def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: FloatArray) -> bool:
+def _acceptable(bench: Bench, fit: Fit, new: Fit, noise: NoiseFloor, steps: FloatArray, smallest: FloatArray) -> bool:
     """Whether the last effect of a new fit is large enough, and is neither hidden nor a matter of one pass.
 
     Args:
         bench: the recording.
         fit: without the effect.
         new: with it.
+        noise: noise floor of both.
         steps: (S, M) whitened steps between periods without it.
         smallest: (E,) change of the torque that matters, as a share of it [-].
     """
@@ -294,7 +297,8 @@ def _acceptable(bench: Bench, fit: Fit, new: Fit, steps: FloatArray, smallest: F
         return False
     if fit.statistic - new.statistic > COMPLETE * fit.excess:
         smallest = np.minimum(smallest, SMALLEST_SHARE)
-    if np.all(visible_changes(bench, fit, new) < smallest):
+    hidden = np.all(visible_changes(bench, fit, new) < smallest)
+    if hidden and (own < SMALLEST_SHARE or not taken_up(bench, fit, new, noise, -1)):
         return False
     if scatter_p(steps, fit.whitened - new.whitened) <= SCATTER_LEVEL:
         return True

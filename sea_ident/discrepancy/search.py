@@ -12,7 +12,14 @@ from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
-from sea_ident.discrepancy.judge import at_a_bound, is_push, own_torque, significance, torque_change, torque_changes
+from sea_ident.discrepancy.judge import (
+    at_a_bound,
+    is_push,
+    own_torque,
+    significance,
+    torque_change,
+    torque_changes,
+)
 from sea_ident.discrepancy.kinks import with_their_kinks
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import (
@@ -26,6 +33,7 @@ from sea_ident.discrepancy.next_effect import (
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again
+from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
 
@@ -282,7 +290,8 @@ class _Elimination:
         columns = max(len(effect.columns(bench.robot)), 1)
         visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
         # as where it was added: what the model bends by without it says nothing of its size
-        needed = min(visible, 2.0 * own) >= SMALLEST_SHARE and physical(bench, fit, position)
+        shows = visible >= SMALLEST_SHARE or taken_up(bench, without, fit, noise, position)
+        needed = shows and 2.0 * own >= SMALLEST_SHARE and physical(bench, fit, position)
         # nor what beside the others ended at the end of its range
         needed = needed and not at_a_bound(effect)
         if is_push(effect):

@@ -278,5 +278,5 @@ def test_a_shape_that_cannot_be_is_refused_with_its_range(value):
 @pytest.mark.parametrize("values", [None, "1", [1.0, "x"]])
 def test_what_is_in_a_load_without_numbers_is_refused(values):
     term = {"effect": "spring_offset", "joint": "knee", "shape": {}} | ({} if values is None else {"values": values})
-    with pytest.raises(EffectError, match="spring_offset at knee.* in the load of another: values .* is not a list"):
+    with pytest.raises(EffectError, match=r"spring_offset at knee.* in the load of another: values .* is not a list"):
         effect_from_dict({"effect": "directional_efficiency", "joint": "knee", "shape": {"terms": [term]}})
