@@ -18,6 +18,7 @@ from sea_ident.discrepancy.findings import (
     MissingEffect,
     MissingParameter,
     NextExperiment,
+    Unseen,
     Verdict,
     Waveforms,
     chance,
@@ -202,14 +203,25 @@ def _missing_to_dict(m: MissingEffect) -> dict[str, Any]:
     return {
         "effect": m.effect,
         "joint": m.joint,
-        "parameters": [{"name": p.name, "value": p.value, "std": p.std, "unit": p.unit} for p in m.parameters],
+        "parameters": [_parameter_to_dict(p) for p in m.parameters],
         "torque_share": m.torque_share,
         "p_value": m.p_value,
         "alternatives": [{"effect": a.effect, "joint": a.joint, "cos2": a.cos2} for a in m.alternatives],
         "transfer": m.transfer,
         "detail": None if m.detail is None else m.detail.to_dict(),
         "values": list(m.values),
+        "unseen": None
+        if m.unseen is None
+        else {
+            "effect": m.unseen.effect,
+            "joint": m.unseen.joint,
+            "parameters": [_parameter_to_dict(p) for p in m.unseen.parameters],
+        },
     }
+
+
+def _parameter_to_dict(p: MissingParameter) -> dict[str, Any]:
+    return {"name": p.name, "value": p.value, "std": p.std, "unit": p.unit}
 
 
 def _gap_to_dict(gap: Gap) -> dict[str, Any]:
@@ -278,19 +290,26 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
 
 
 def _missing_from_dict(m: Mapping[str, Any]) -> MissingEffect:
+    unseen = m.get("unseen")
     return MissingEffect(
         effect=m["effect"],
         joint=m["joint"],
-        parameters=tuple(
-            MissingParameter(str(p["name"]), _finite(p["value"]), _finite(p["std"]), str(p["unit"]))
-            for p in m["parameters"]
-        ),
+        parameters=_parameters_from_dict(m["parameters"]),
         torque_share=_finite(m["torque_share"]),
         p_value=_finite(m["p_value"]),
         alternatives=tuple(Alternative(a["effect"], a["joint"], _finite(a["cos2"])) for a in m["alternatives"]),
         transfer=None if m.get("transfer") is None else _finite(m["transfer"]),
         detail=None if m.get("detail") is None else effect_from_dict(m["detail"]),
         values=tuple(_finite(value) for value in m.get("values", ())),
+        unseen=None
+        if unseen is None
+        else Unseen(unseen["effect"], unseen["joint"], _parameters_from_dict(unseen["parameters"])),
+    )
+
+
+def _parameters_from_dict(records: Iterable[Mapping[str, Any]]) -> tuple[MissingParameter, ...]:
+    return tuple(
+        MissingParameter(str(p["name"]), _finite(p["value"]), _finite(p["std"]), str(p["unit"])) for p in records
     )
 
 

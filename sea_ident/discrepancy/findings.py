@@ -153,6 +153,26 @@ class Alternative:
         return not self.dearer and self.behind == 0.0
 
 
+@dataclass(frozen=True)
+class Unseen:
+    """What may be beside an effect at its joint and would hardly show there.
+
+    Attributes:
+        effect: name.
+        joint: joint.
+        parameters: those of the effect that are known much less with it there, with their standard deviations then.
+    """
+
+    effect: str
+    joint: str | None
+    parameters: tuple[MissingParameter, ...]
+
+    @property
+    def title(self) -> str:
+        """Name and joint."""
+        return titled(self.effect, self.joint)
+
+
 TIMES = 1.0
 """Share of the torque from which on an effect is said to be so many times the torque [-]."""
 
@@ -172,6 +192,7 @@ class MissingEffect:
             None where that was not tested.
         detail: the effect itself, with its shape.
         values: values of its columns.
+        unseen: what may be beside it and make its parameters others, None where nothing would.
     """
 
     effect: str
@@ -183,6 +204,7 @@ class MissingEffect:
     transfer: float | None = None
     detail: Effect | None = None
     values: tuple[float, ...] = ()
+    unseen: Unseen | None = None
 
     @property
     def title(self) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter
+from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter, Unseen
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import own_torque
@@ -17,10 +17,14 @@ from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.uncertainty import uncertainties
+from sea_ident.discrepancy.unseen import beside_others
 from sea_ident.effects import Effect, Shape, Side
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.estimation.spring_untold import told_by_rest, untold
 from sea_ident.estimation.springs import spring_columns
+
+WIDER = 5.0
+"""Factor by which a standard deviation must be larger beside another effect for that to be told [-]."""
 
 
 def named_effects(
@@ -38,7 +42,8 @@ def named_effects(
         held: how it did on data that was not used.
     """
     fit, open_ = selection.final.fit, with_open_powers(bench, selection.final)
-    stds, free = uncertainties(bench, open_), open_.fit.free_shapes
+    plain, free = uncertainties(bench, open_), open_.fit.free_shapes
+    beside = {joint: tuple(beside_others(bench, open_, joint)) for joint in _joints(selection)}
     first = len(fit.effects) - selection.added
     out = []
     nameless = resting(selection, held)
@@ -47,9 +52,41 @@ def named_effects(
             continue
         transfer = held.transfers[k] if held is not None and held.transfers else None
         others = alternatives.get(position, ())
+        there = beside.get(fit.effects[position].joint or "", ())
+        stds = np.max([plain, *(np.hypot(plain, each.shift) for each in there if each.better)], axis=0)
         found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free)
+        wider = [
+            (each.effect, named_effect(bench, fit, position, np.hypot(stds, each.stds), 1.0, (), free).parameters)
+            for each in there
+            if np.any(each.stds > WIDER * stds)
+        ]
+        found = replace(found, unseen=unseen(found.parameters, wider))
         out.append(replace(found, transfer=None if transfer is None or not transfer.tested else transfer.share))
     return out
+
+
+def _joints(selection: Selection) -> set[str]:
+    """Joints at which effects were added."""
+    return {effect.joint for effect in selection.effects if effect.joint is not None}
+
+
+def unseen(
+    parameters: Sequence[MissingParameter], wider: Sequence[tuple[Effect, Sequence[MissingParameter]]]
+) -> Unseen | None:
+    """What makes the parameters of an effect known least if it is there too; None where nothing makes much of that.
+
+    Args:
+        parameters: of the effect.
+        wider: the same with the standard deviations that they have beside other effects.
+    """
+    found: tuple[float, Unseen] | None = None
+    for other, beside in wider:
+        pairs = [(p, p.std / own.std) for own, p in zip(parameters, beside, strict=True) if own.std > 0.0]
+        most = max((ratio for _, ratio in pairs), default=0.0)
+        if most > WIDER and (found is None or most > found[0]):
+            affected = tuple(p for p, ratio in pairs if ratio > WIDER)
+            found = most, Unseen(other.name, other.joint, affected)
+    return None if found is None else found[1]
 
 
 def named_effect(
