@@ -128,7 +128,7 @@ def test_beside_many_effects_one_more_must_explain_half_of_what_is_left(
     new = bench.fit((*fit.effects, make_effect("torque_ripple", "hip", order=12.0)), nothing_missing[1].noise)
     assert (fit.statistic - new.statistic) / fit.excess == pytest.approx(share, abs=0.1)
     quiet, nothing = np.random.default_rng(0).standard_normal((8, len(fit.whitened))), np.zeros(len(data.equations))
-    assert _acceptable(bench, fit, new, quiet, nothing)
+    assert _acceptable(bench, fit, new, nothing_missing[1].noise, quiet, nothing)
     # the same two models, with four effects that were added before it and with three
     now, gain = Settled(fit, nothing_missing[1].noise), fit.statistic - new.statistic
     assert (gain >= least_useful(bench, now)) is beside_many
