@@ -144,14 +144,17 @@ def test_a_term_of_the_law_of_a_spring_may_be_cancelled_by_others_of_it(laborato
     new = bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters)
     names = [column.name for column in new.columns]
     linear, power = (names.index(f"knee.{name}") for name in ("spring_stiffness", "spring_stiffening_power"))
-    quiet = np.random.default_rng(0).standard_normal((8, len(new.whitened)))
+    quiet, nothing = (
+        np.random.default_rng(0).standard_normal((8, len(new.whitened))),
+        np.zeros(len(bench.data.equations)),
+    )
     for stiffness, accepted in ((1e6, True), (1e3, False)):
         values = new.values.copy()
         values[linear], values[power] = stiffness, -1e5
         large = replace(new, values=values)
         assert own_torque(bench, large, -1) > LARGE_TORQUE
         assert torque_change(bench, start.fit, large) < CANCELLED * own_torque(bench, large, -1)
-        assert _acceptable(bench, start.fit, large, quiet, np.zeros(len(bench.data.equations))) is accepted
+        assert _acceptable(bench, start.fit, large, start.noise, quiet, nothing) is accepted
 
 
 @pytest.mark.parametrize(
