@@ -16,7 +16,7 @@ from sea_ident.estimation.spring_verdict import SLIPS, hysteresis_column
 from sea_ident.motion import Motion
 from sea_ident.processing.harmonics import within
 
-TAKES = 0.3
+TAKES = 0.1
 """Share of what is left, in energy, that columns must take to count as what may be missing [-]."""
 
 PLAIN = 2.0
