@@ -17,9 +17,10 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.discrepancy.settle import Settled
-from sea_ident.discrepancy.trend import EQUALLY_GOOD, UNEXPLAINED, Trend, TrendTest, trend_excess
+from sea_ident.discrepancy.trend import UNEXPLAINED, Trend, TrendTest, trend_excess
 from sea_ident.discrepancy.trend_directions import Cause, Direction, PeriodColumns, courses, flat_periods
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
+from sea_ident.discrepancy.trend_search import EQUALLY_GOOD
 from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects import Column, Contribution, Effect, Side, State
 from sea_ident.effects.drift import DriftEffect

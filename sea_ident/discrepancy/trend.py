@@ -17,7 +17,6 @@ from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
 from sea_ident.discrepancy.trend_directions import (
     Direction,
-    Name,
     PeriodColumns,
     courses,
     flat_periods,
@@ -25,7 +24,7 @@ from sea_ident.discrepancy.trend_directions import (
     steady_rows,
 )
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
-from sea_ident.discrepancy.trend_search import Chosen, Sized, alike, best_trend, find_trends
+from sea_ident.discrepancy.trend_search import Chosen, Sized, as_good, best_trend, find_trends
 from sea_ident.discrepancy.trend_values import CourseValues, course_values
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
@@ -49,9 +48,6 @@ CARRIED_ON = 0.3
 
 CHANCE = 4.0
 """... and what it must do there for each of its columns: more than two standard deviations."""
-
-EQUALLY_GOOD = 13.8
-"""Two trends between whose gains there is less than this (odds of a thousand) are not told apart."""
 
 FREE_BEND = 2.0
 """What a course that bends must explain more to be as likely as a straight one where the deviations of rates are told:
@@ -198,7 +194,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value
-    trends = tuple(_trend(numbers, chosen, k, directions, change, inside) for k in range(len(chosen)))
+    trends = tuple(_trend(numbers, chosen, k, directions, middle, change, inside) for k in range(len(chosen)))
     soon = [_is_over_soon(bench, c.direction) for c in chosen]
     told = [trend.known(SURE if over else NOT_AT_ALL) for trend, over in zip(trends, soon, strict=True)]
     if not all(told):
@@ -206,7 +202,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
             _not_told(bench, trend, over) for trend, over, known in zip(trends, soon, told, strict=True) if not known
         )
         chosen = [c for c, known in zip(chosen, told, strict=True) if known]
-        trends = tuple(_trend(numbers, chosen, k, directions, change, inside) for k in range(len(chosen)))
+        trends = tuple(_trend(numbers, chosen, k, directions, middle, change, inside) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
@@ -341,6 +337,7 @@ def _trend(
     chosen: Sequence[Chosen],
     position: int,
     directions: Sequence[Direction],
+    middle: FloatArray,
     change: _Change,
     inside: Callable[[Direction, CourseValues], CourseValues],
 ) -> Trend:
@@ -350,16 +347,8 @@ def _trend(
     beside = [c.direction.course for c in others]
     values = inside(direction, course_values(numbers, [direction.course, *beside])[0])
     held = held_basis([c.direction for c in others])
-    taken = {c.direction.name for c in chosen}
-    alternatives: dict[Name, tuple[Effect, float]] = {}
-    for other in directions:
-        if other.name in taken:
-            continue
-        amount = gain(numbers, other, held)[0]
-        if own.gain - amount < EQUALLY_GOOD:
-            share = alike(numbers, direction, other, held)
-            if share > alternatives.get(other.name, (other.effect, 0.0))[1]:
-                alternatives[other.name] = (other.effect, share)
+    directions = [d for d in directions if d.name == direction.name or d.name not in {c.direction.name for c in others}]
+    alternatives = as_good(numbers, directions, middle, own, held)
     at_start = _at_start(direction, values.values)
     # of a share of what drifts itself: d (v / (1 + v c)) = (1 / (1 + v c))^2 dv
     stds = values.stds * (at_start / np.where(values.values == 0.0, 1.0, values.values)) ** 2
@@ -376,7 +365,7 @@ def _trend(
         gain=own.gain,
         p_value=own.p_value,
         torque_change=change(direction, values.values),
-        alternatives=tuple(sorted(alternatives.values(), key=lambda a: -a[1])),
+        alternatives=alternatives,
         time_constant_std=getattr(direction.effect, "time_constant", 0.0) * values.bend_std,
     )
 

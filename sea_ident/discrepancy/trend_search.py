@@ -10,12 +10,20 @@ from scipy.optimize import minimize_scalar
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.trend_directions import Direction, with_course
+from sea_ident.discrepancy.trend_directions import Direction, Name, with_course
 from sea_ident.discrepancy.trend_scatter import blocks, gain, held_basis, scatter_p
 from sea_ident.discrepancy.trend_values import times_course
+from sea_ident.effects import Effect
 
 PRICE_OF_A_BEND = 6.6
 """What a time constant of its own must explain beyond a straight course, or one that was measured: one in a hundred."""
+
+EQUALLY_GOOD = 13.8
+"""Two trends between whose gains there is less than this (odds of a thousand) are not told apart."""
+
+FORM = 1e-3
+"""Share of its gain up to which the form of a trend is known no better than that of another one [-]: what a wrist with
+next to no load does with a torque constant that falls is friction that grows, but for a part in a thousand."""
 
 ROUNDS = 3
 """Largest number of exchanges of all trends."""
@@ -42,6 +50,11 @@ class Chosen:
         direction = self.direction
         own_course = direction.effect.name == "friction_drift" and direction.effect.joint in warmed
         return self.gain - PRICE_OF_A_BEND * (int(direction.bent) + int(own_course))
+
+    @property
+    def net(self) -> float:
+        """Gain, less the price of a time constant and of every column but the first."""
+        return self.gain - PRICE_OF_A_BEND * (int(self.direction.bent) + len(self.used) - 1)
 
 
 class Sized(NamedTuple):
@@ -102,6 +115,38 @@ def _refined(periods: FloatArray, start: Chosen, middle: FloatArray, basis: Floa
     )  # fmt: skip
     new = _untested(periods, at(float(found.x)), basis)
     return new if new.gain > start.gain else start
+
+
+def as_good(
+    periods: FloatArray,
+    directions: Sequence[Direction],
+    middle: FloatArray,
+    own: Chosen,
+    held: FloatArray | None,
+) -> tuple[tuple[Effect, float], ...]:
+    """What explains as much as a trend, each kind with the course that explains most.
+
+    Args:
+        periods: (P, M) whitened numbers of every period.
+        directions: trends to choose from.
+        middle: (P,) middles of the periods [s].
+        own: the trend.
+        held: orthonormal basis of the trends beside it; None where there are none.
+
+    Returns:
+        Effects, and the share of what the trend explains that each does, the largest first.
+    """
+    best: dict[Name, Chosen] = {}
+    for direction in directions:
+        tried = _untested(periods, direction, held)
+        if direction.name != own.direction.name and tried.net >= best.get(direction.name, tried).net:
+            best[direction.name] = tried
+    found = []
+    for rival in best.values():
+        refined = _refined(periods, rival, middle, held) if rival.direction.bent else rival
+        if own.net - refined.net < max(EQUALLY_GOOD, FORM * own.gain):
+            found.append((refined.direction.effect, alike(periods, own.direction, refined.direction, held)))
+    return tuple(sorted(found, key=lambda each: -each[1]))
 
 
 def find_trends(

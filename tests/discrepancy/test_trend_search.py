@@ -1,12 +1,22 @@
 """Which trends are chosen: beside each other, straight where nothing speaks for a bend, by what was measured."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.trend import _trend
 from sea_ident.discrepancy.trend_directions import Cause, courses
-from sea_ident.discrepancy.trend_search import alike, best_trend, find_trends
+from sea_ident.discrepancy.trend_search import (
+    EQUALLY_GOOD,
+    FORM,
+    PRICE_OF_A_BEND,
+    alike,
+    as_good,
+    best_trend,
+    find_trends,
+)
 from sea_ident.effects import make_effect
 from sea_ident.effects.drift import warming
 
@@ -161,8 +171,39 @@ def test_a_rate_is_as_sure_as_is_said_whether_its_course_bends_or_not(time_const
         chosen = find_trends(flat, directions, MIDDLE, FLOOR, 2, 1e-3, lambda d, v: True)
         # of which nothing is known within a period
         trends = [
-            _trend(flat, chosen, k, directions, lambda d, v: 0.1, lambda d, found: found) for k in range(len(chosen))
+            _trend(flat, chosen, k, directions, MIDDLE, lambda d, v: 0.1, lambda d, found: found)
+            for k in range(len(chosen))
         ]
         scores.extend((t.values[0] - rate) / t.stds[0] for t in trends)
     assert len(scores) > 60
     assert np.sqrt(np.mean(np.square(scores))) < 1.7
+
+
+@pytest.mark.parametrize(("apart", "size", "told"), [(0.02, 20.0, False), (0.1, 20.0, True), (0.1, 0.2, False)])
+def test_what_a_trend_could_be_as_well_has_the_course_that_is_best_for_it(apart, size, told):
+    """Of two with nearly the same columns no form is known well enough to tell them, however large both are."""
+    one, third = axes(2)
+    directions = [*trend(one, "hip"), *trend((one + apart * third) / np.hypot(1.0, apart), "knee")]
+    # a time constant that no search tries as it is
+    flat = noisy(np.random.default_rng(6), np.outer(size * warming(MIDDLE, 47.0) * 60.0, one))
+    (own,) = find_trends(flat, directions, MIDDLE, FLOOR, 1, 1e-3, lambda d, v: True)
+    assert own.direction.effect.joint == "hip"
+    rivals = as_good(flat, directions, MIDDLE, own, None)
+    assert [effect.joint for effect, _ in rivals] == ([] if told else ["knee"])
+    for effect, share in rivals:
+        assert effect.time_constant == pytest.approx(own.direction.effect.time_constant, rel=0.05)
+        assert share == pytest.approx(1.0 / (1.0 + apart**2), abs=0.02)
+
+
+@pytest.mark.parametrize(("used", "rivals"), [((0,), 0), ((0, 1), 1)])
+def test_another_column_is_paid_for(used, rivals):
+    """Friction has two, a torque constant one: where the two explain a little more, the one may be it."""
+    one, other = axes(2)
+    flat = noisy(np.random.default_rng(7), np.outer(0.5 * MIDDLE, one))
+    best = best_trend(flat, trend(one, "hip", "torque_constant_drift"), MIDDLE, FLOOR)
+    friction = next(d for d in trend(other, "hip", "friction_drift") if not d.bent)
+    assert not best.direction.bent
+    more = EQUALLY_GOOD + 0.5 * PRICE_OF_A_BEND
+    own = replace(best, direction=friction, used=used, gain=best.gain + more)
+    assert FORM * own.gain < EQUALLY_GOOD
+    assert len(as_good(flat, trend(one, "hip", "torque_constant_drift"), MIDDLE, own, None)) == rivals
