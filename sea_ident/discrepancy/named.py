@@ -53,7 +53,10 @@ def named_effects(
         transfer = held.transfers[k] if held is not None and held.transfers else None
         others = alternatives.get(position, ())
         there = beside.get(fit.effects[position].joint or "", ())
-        stds = np.max([plain, *(np.hypot(plain, each.shift) for each in there if each.better)], axis=0)
+        shifts = [each.shift for each in there if each.better]
+        for place, alike in alternatives.items():
+            shifts.extend(_shift(open_.fit, alternative) for alternative in alike if place != position)
+        stds = np.max([plain, *(np.hypot(plain, shift) for shift in shifts)], axis=0)
         found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free)
         wider = [
             (each.effect, named_effect(bench, fit, position, np.hypot(stds, each.stds), 1.0, (), free).parameters)
@@ -63,6 +66,16 @@ def named_effects(
         found = replace(found, unseen=unseen(found.parameters, wider))
         out.append(replace(found, transfer=None if transfer is None or not transfer.tested else transfer.share))
     return out
+
+
+def _shift(fit: Fit, alternative: Alternative) -> FloatArray:
+    """(p + s,) by how much parameters are others in the model with what another effect may be as well."""
+    shift = np.zeros(len(fit.columns) + len(fit.free_shapes))
+    if alternative.fit is None or not alternative.as_likely:
+        return shift
+    there = alternative.fit.parameters
+    shift[: len(fit.columns)] = [there.get(name, value) - value for name, value in fit.parameters.items()]
+    return shift
 
 
 def _joints(selection: Selection) -> set[str]:

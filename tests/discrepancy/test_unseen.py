@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.findings import MissingEffect, MissingParameter, Unseen
+from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter, Unseen
 from sea_ident.discrepancy.named import WIDER, named_effects, unseen
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle
@@ -75,6 +75,33 @@ def test_what_is_worth_nothing_does_not_make_an_effect_less_known(laboratory):
     (beside,) = found.unseen.parameters
     assert (beside.name, beside.value) == (told.name, told.value)
     assert beside.std > WIDER * told.std
+
+
+@pytest.mark.parametrize(("dearer", "covered"), [(False, True), (True, False)])
+def test_what_depends_on_what_another_effect_is_covers_all_that_it_may_be(laboratory, dearer, covered):
+    """A constant at the motor is one in the spring and one on the link: a preload there is told as of one of them."""
+    preload, constant = 0.4, -0.7
+    planted = [("torque_offset", "knee", [constant], {}), ("parallel_spring", "knee", [1.3, preload], {})]
+    bench = laboratory.bench(laboratory.record(planted, periods=8))
+    start = settle(bench, bench.effects)
+    fits = [
+        bench.fit(
+            (*start.fit.effects, make_effect(name, "knee"), make_effect("parallel_spring", "knee")),
+            start.noise,
+            start=start.fit.parameters,
+        )
+        for name in ("spring_offset", "torque_offset")
+    ]
+    assert fits[0].statistic == pytest.approx(fits[1].statistic, rel=1e-3)
+    selection = Selection(start, Settled(fits[0], start.noise), 2, (0.0, 0.0))
+    other = Alternative("torque_offset", "knee", 1.0, fits[1], dearer=dearer)
+    found = named_effects(bench, selection, {len(start.fit.effects): (other,)}, None)
+    told = {p.name: p for effect in found for p in effect.parameters}
+    rest = told["knee.parallel_spring_preload"]
+    assert rest.value - preload == pytest.approx(constant, abs=0.1)
+    assert (abs(rest.value - preload) < 2.0 * rest.std) is covered
+    # what it is itself is told as of that
+    assert told["knee.spring_offset"].std < 0.1 * abs(constant)
 
 
 def parameter(name, std):
