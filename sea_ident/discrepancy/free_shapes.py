@@ -26,6 +26,9 @@ SHAPES_THAT_STAY = {
 }
 """Shape parameters that are not refined: they come from elsewhere."""
 
+LARGEST_STEP = 100.0
+"""Step of a logarithm that leads beyond any range: what is not known at all asks for more than numbers can hold [-]."""
+
 
 def is_signal(effect: Effect) -> bool:
     """Whether an effect sits in the chain of signals."""
@@ -101,7 +104,7 @@ def moved(effect: Effect, shape: Shape, step: float) -> Effect:
     A shape that was given outside its range stays where it is on one side.
     """
     value = float(getattr(effect, shape.name))
-    new = value * np.exp(step) if shape.logarithmic else value + step * (shape.upper - shape.lower)
+    new = value * np.exp(min(step, LARGEST_STEP)) if shape.logarithmic else value + step * (shape.upper - shape.lower)
     within = float(np.clip(new, min(shape.lower, value), max(shape.upper, value)))
     return replace(effect, **{shape.name: within})  # type: ignore[arg-type]
 

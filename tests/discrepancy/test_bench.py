@@ -169,6 +169,7 @@ def test_a_shape_has_the_room_that_is_left_in_its_range():
         (width.lower, width.upper)
     )
     assert room(make_effect("backlash", "knee", half_width=width.upper), width)[1] == 0.0
+    assert moved(play, width, 1e4).half_width == width.upper
     push = make_effect("external_force", "knee", point_x=0.7)
     point = next(shape for shape in push.shapes if shape.name == "point_x")
     assert room(push, point) == pytest.approx((-1.2, 0.0))
