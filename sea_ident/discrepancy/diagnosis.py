@@ -82,6 +82,7 @@ class Diagnosis:
         for m in self.missing:
             lines.append(f"  {kind}: {m.title}, {m.extent}, p {chance(m.p_value)}")
             lines.extend(f"    {p}" for p in m.parameters)
+            lines.extend([] if m.unseen is None else [f"    {m.unseen}"])
             if m.alternatives:
                 others = ", ".join(f"{a.title} ({a.cos2:.3f})" for a in m.alternatives)
                 lines.append(f"    or: {others}")

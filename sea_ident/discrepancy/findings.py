@@ -172,6 +172,11 @@ class Unseen:
         """Name and joint."""
         return titled(self.effect, self.joint)
 
+    def __str__(self) -> str:
+        """What it is, and how well the parameters are known with it there."""
+        known = ", ".join(map(str, self.parameters))
+        return f"known so well only without {self.title}, which would hardly show beside it: with one, {known}"
+
 
 TIMES = 1.0
 """Share of the torque from which on an effect is said to be so many times the torque [-]."""

@@ -12,14 +12,7 @@ from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
-from sea_ident.discrepancy.judge import (
-    at_a_bound,
-    is_push,
-    own_torque,
-    significance,
-    torque_change,
-    torque_changes,
-)
+from sea_ident.discrepancy.judge import at_a_bound, is_push, own_torque, significance, torque_change, torque_changes
 from sea_ident.discrepancy.kinks import with_their_kinks
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import (

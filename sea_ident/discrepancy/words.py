@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sea_ident.discrepancy.breakaway import Breakaway
 from sea_ident.discrepancy.data import PeriodData
-from sea_ident.discrepancy.findings import Gap, MissingEffect, Unseen, Verdict, chance
+from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL
@@ -226,18 +226,9 @@ def reservations(facts: Facts) -> list[str]:
             "told. Record the same once more while it goes another way, as in cooling down"
         )
     found.extend(m.detail.reservation for m in facts.missing if m.detail is not None and m.detail.reservation)
-    found.extend(_known_without(m, m.unseen) for m in facts.missing if m.unseen is not None)
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")
     return found
-
-
-def _known_without(effect: MissingEffect, other: Unseen) -> str:
-    """That an effect is known so well only as long as another is not there too."""
-    return (
-        f"{effect.title} is known so well only if there is no {other.title} too, which would hardly show beside it: "
-        f"with one, {', '.join(map(str, other.parameters))}"
-    )
 
 
 def _not_compared(facts: Facts, standing: Standing) -> str:

@@ -115,6 +115,8 @@ def effect_from_dict(record: Mapping[str, Any]) -> Effect:
     if not isinstance(shape, Mapping):
         raise EffectError(f"effect {record['effect']!r}: shape is not a mapping")
     if "terms" in shape:
+        if not isinstance(shape["terms"], list):
+            raise EffectError(f"effect {record['effect']!r}: terms {shape['terms']!r} is not a list of effects")
         shape = {**shape, "terms": tuple(_term_from_dict(term) for term in shape["terms"])}
     return make_effect(str(record["effect"]), record.get("joint"), **shape)
 

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter, Unseen
+from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
+from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, MissingParameter, Unseen, Verdict
 from sea_ident.discrepancy.named import WIDER, named_effects, unseen
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.discrepancy.unseen import beside_others
-from sea_ident.discrepancy.words import _known_without
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter
 
@@ -120,15 +120,18 @@ def test_the_one_that_makes_it_known_least_is_told_with_what_it_makes_so():
     assert unseen(own, wider) == Unseen("encoder_offset", "knee", (parameter("b", 3.0 * WIDER),))
 
 
-def test_it_is_said_in_a_sentence():
+def test_it_is_said_beside_the_effect_and_kept_in_the_file(tmp_path):
     there = Unseen("encoder_offset", "knee", (parameter("knee.spring_offset", 0.5),))
-    effect = MissingEffect(
-        "spring_offset", "knee", (parameter("knee.spring_offset", 0.01),), 0.1, 0.0, (), unseen=there
+    own = parameter("knee.spring_offset", 0.01)
+    effects = tuple(MissingEffect("spring_offset", "knee", (own,), 0.1, 0.0, (), unseen=u) for u in (there, None))
+    found = Diagnosis(Verdict.NAMED, "", LackOfFit(0.0, 1, 1.0, 1.0, {}), (), effects)
+    told = (
+        "    known so well only without encoder_offset at knee, which would hardly show beside it: with one, "
+        "knee.spring_offset 2 +- 0.5 N m"
     )
-    assert _known_without(effect, there) == (
-        "spring_offset at knee is known so well only if there is no encoder_offset at knee too, which would hardly "
-        "show beside it: with one, knee.spring_offset 2 +- 0.5 N m"
-    )
+    assert found.summary().splitlines().count(told) == 1
+    found.save(tmp_path / "DIAGNOSIS.json")
+    assert [effect.unseen for effect in read_diagnosis(tmp_path / "DIAGNOSIS.json").missing] == [there, None]
 
 
 @pytest.mark.scenario

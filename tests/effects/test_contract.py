@@ -280,3 +280,9 @@ def test_what_is_in_a_load_without_numbers_is_refused(values):
     term = {"effect": "spring_offset", "joint": "knee", "shape": {}} | ({} if values is None else {"values": values})
     with pytest.raises(EffectError, match=r"spring_offset at knee.* in the load of another: values .* is not a list"):
         effect_from_dict({"effect": "directional_efficiency", "joint": "knee", "shape": {"terms": [term]}})
+
+
+@pytest.mark.parametrize("terms", [None, {"effect": "spring_offset"}, "spring_offset"])
+def test_what_is_in_a_load_is_a_list(terms):
+    with pytest.raises(EffectError, match=r"'directional_efficiency': terms .* is not a list of effects"):
+        effect_from_dict({"effect": "directional_efficiency", "joint": "knee", "shape": {"terms": terms}})
