@@ -18,6 +18,7 @@ from sea_ident.discrepancy.findings import (
     MissingEffect,
     MissingParameter,
     NextExperiment,
+    Unseen,
     Verdict,
     Waveforms,
 )
@@ -136,6 +137,17 @@ def test_a_straight_course_is_called_so_and_has_no_time(diagnosis, tmp_path):
         written = drifts.to_dict()["missing"][0]["parameters"][1]
         assert written == {"name": mark.name, "value": time.value, "std": time.std, "unit": "s"}
     assert "none: the course" not in str(replace(mark, name="knee.stribeck_friction_speed"))
+
+
+def test_the_page_says_what_would_make_an_amount_known_less(diagnosis, tmp_path):
+    (found,) = diagnosis.missing
+    there = Unseen("encoder_offset", "knee", (replace(found.parameters[0], std=0.3),))
+    diagnosis = replace(diagnosis, missing=(replace(found, unseen=there),))
+    told = (
+        "It is known so well only without encoder_offset at knee, which would hardly show beside it: with one, "
+        "knee.stribeck_friction 0.6 +- 0.3 N m."
+    )
+    assert told in words(page_of(diagnosis, tmp_path))
 
 
 def test_what_was_held_has_no_standard_deviation(diagnosis, tmp_path):
