@@ -43,6 +43,7 @@ def named_effects(
     """
     fit, open_ = selection.final.fit, with_open_powers(bench, selection.final)
     plain, free = uncertainties(bench, open_), open_.fit.free_shapes
+    ambiguous = [_shift(open_.fit, alternative) for alike in alternatives.values() for alternative in alike]
     beside = {joint: tuple(beside_others(bench, open_, joint)) for joint in _joints(selection)}
     first = len(fit.effects) - selection.added
     out = []
@@ -53,9 +54,7 @@ def named_effects(
         transfer = held.transfers[k] if held is not None and held.transfers else None
         others = alternatives.get(position, ())
         there = beside.get(fit.effects[position].joint or "", ())
-        shifts = [each.shift for each in there if each.better]
-        for place, alike in alternatives.items():
-            shifts.extend(_shift(open_.fit, alternative) for alternative in alike if place != position)
+        shifts = [*ambiguous, *(each.shift for each in there if each.better)]
         stds = np.max([plain, *(np.hypot(plain, shift) for shift in shifts)], axis=0)
         found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free)
         wider = [
@@ -69,7 +68,7 @@ def named_effects(
 
 
 def _shift(fit: Fit, alternative: Alternative) -> FloatArray:
-    """(p + s,) by how much parameters are others in the model with what another effect may be as well."""
+    """(p + s,) by how much parameters are others in the model with what an effect may be as well in its place."""
     shift = np.zeros(len(fit.columns) + len(fit.free_shapes))
     if alternative.fit is None or not alternative.as_likely:
         return shift

@@ -14,7 +14,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.settle import Settled
-from sea_ident.effects import Effect, Side
+from sea_ident.effects import Effect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import EffectError
 
@@ -77,8 +77,6 @@ def _directions(bench: Bench, now: Settled, effect: Effect) -> FloatArray:
         slopes = np.stack([slope for _, slope in shown], axis=-1)
     else:
         torque = bench.column_spectra(effect, fit.effects)
-        slopes = np.zeros(torque.shape[1:])
-        if effect.side is Side.SPRING:
-            slopes = bench.slopes_of(torque, bench.links_of(effect), fit.effects)
+        slopes = np.zeros(torque.shape[1:])  # what has a slope is a term of the law, and that is in the model
     scaled = bench.scaled(torque, slopes, fit.residual, fit.scale, bench.stiffness_of(fit))
     return bench.whitening(now.noise).flat(scaled)

@@ -94,6 +94,15 @@ def test_what_holds_elsewhere_stays_with_its_size(rippled):
     assert found.start.fit.statistic / found.start.fit.dof > 3.0
 
 
+@pytest.mark.parametrize("hidden", [False, True])
+def test_what_hardly_shows_elsewhere_stays_where_another_takes_it_up(rippled, monkeypatch, hidden):
+    bench, *_ = rippled
+    selection = selected(bench, [RIPPLE])
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.torque_change", lambda *args: 0.0)
+    monkeypatch.setattr("sea_ident.discrepancy.confirm.taken_up", lambda *args: hidden)
+    assert confirm(bench, selection).selection.added == (selection.added if hidden else 0)
+
+
 def test_more_is_left_out_around_reversals(rippled):
     data = rippled[0].data
     away = away_from_reversals(data)

@@ -281,6 +281,14 @@ def test_what_is_smaller_than_what_matters_goes_however_the_model_bends_without_
     assert still_needed(bench, found).added == left
 
 
+@pytest.mark.parametrize(("hidden", "left"), [(False, 0), (True, 2)])
+def test_what_hardly_shows_stays_where_another_takes_it_up(unequal, monkeypatch, hidden, left):
+    bench, found = unequal
+    monkeypatch.setattr("sea_ident.discrepancy.search.torque_change", lambda *args: 0.0)
+    monkeypatch.setattr("sea_ident.discrepancy.search.taken_up", lambda *args: hidden)
+    assert still_needed(bench, found).added == left
+
+
 def test_what_ended_at_the_end_of_its_range_beside_the_others_goes(unequal):
     """It was at none when it was added: the others were missing yet."""
     bench, found = unequal

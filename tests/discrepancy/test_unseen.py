@@ -95,6 +95,8 @@ def test_what_depends_on_what_another_effect_is_covers_all_that_it_may_be(labora
     assert fits[0].statistic == pytest.approx(fits[1].statistic, rel=1e-3)
     selection = Selection(start, Settled(fits[0], start.noise), 2, (0.0, 0.0))
     other = Alternative("torque_offset", "knee", 1.0, fits[1], dearer=dearer)
+    # nothing is told of how well an amount is known beside what is the same altogether
+    assert "torque_offset" not in {each.effect.name for each in beside_others(bench, selection.final, "knee")}
     found = named_effects(bench, selection, {len(start.fit.effects): (other,)}, None)
     told = {p.name: p for effect in found for p in effect.parameters}
     rest = told["knee.parallel_spring_preload"]
@@ -177,5 +179,9 @@ def test_what_is_taken_up_matters_where_it_explains_the_rest_and_makes_the_other
     fit = SimpleNamespace(effects=(first, second), parameters={"knee.spring_offset": 0.6}, statistic=statistic)
     monkeypatch.setattr(module, "lack_of_fit", lambda bench, settled: (statistic, 100, 0.0))
     assert taken_up(bench, less, fit, None, -1) is expected
+    push = SimpleNamespace(
+        effects=(first, make_effect("external_force", joint)), parameters=fit.parameters, statistic=1.0
+    )
+    assert not taken_up(bench, less, push, None, -1)
     monkeypatch.setattr(module, "lack_of_fit", lambda bench, settled: (statistic, 100, 0.5))
     assert taken_up(bench, less, fit, None, -1) is (expected or statistic == 400.0)

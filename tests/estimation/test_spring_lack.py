@@ -85,6 +85,23 @@ def test_what_none_of_them_has_the_form_of_has_no_name(bent):
     assert lack_of(bent, wave)[1] is None
 
 
+@pytest.mark.parametrize(("part", "told"), [(0.2, True), (0.02, False)])
+def test_what_takes_a_tenth_of_what_is_left_is_named(bent, part, told):
+    """Beside something that none of them has the form of."""
+    columns = spring_columns(bent, 0, 0.0)
+    inverse = np.linalg.pinv(columns)
+
+    def beyond(torque):
+        left = torque - columns @ (inverse @ torque)
+        return left / np.linalg.norm(left)
+
+    constant = {"spring_offset": np.ones((len(bent.time), 1))}
+    own, other = beyond(constant["spring_offset"][:, 0]), beyond(np.sin(2.0 * np.pi * 17.0 * bent.time / 2.0))
+    other = beyond(other - own * (own @ other))
+    found = spring_lack(LAW, np.sqrt(part) * own + np.sqrt(1.0 - part) * other, inverse, columns, constant, 1e-6)
+    assert (found is not None) is told
+
+
 def test_what_would_make_the_stiffness_negative_explains_nothing(bent):
     beside = beside_the_law(bent, 0, 0.0)
     columns = spring_columns(bent, 0, 0.0)

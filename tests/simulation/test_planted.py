@@ -79,6 +79,31 @@ def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet, loaded):
     assert not np.any(run.tau_spring)
 
 
+def test_what_acts_on_a_link_behind_a_spring_is_not_in_the_spring(leg, leg_series, quiet, exact):
+    effect = PlantedEffect(make_effect("link_friction", "hip"), np.array([1.0, 2.0]))
+    run = simulate(leg, leg_series, periods=1, effects=[effect], start=exact.motion, **quiet)
+    d, plant = run.motion.deflection, run.plant
+    law = plant.stiffness * d + plant.cubic_stiffness * d**3 + plant.spring_damping * run.motion.deflection_rate
+    np.testing.assert_allclose(run.tau_spring, law, atol=1e-10)
+
+
+def test_a_load_has_what_is_there_all_the_time_and_what_follows_it_once(leg):
+    """A drift is nothing in the mean, and two that follow the torque of a motor do not follow each other."""
+    names = ("torque_saturation", "directional_efficiency", "torque_offset", "spring_offset", "friction_drift")
+    planted = [PlantedEffect(make_effect(name, "knee"), np.ones(1 + (name == "friction_drift"))) for name in names]
+    parameters = plant_from_robot(leg).values_of((*base_effects(leg), *spring_effects(leg)))
+    effects, _ = in_the_model(leg, planted, parameters)
+    saturation, loss = effects[-5:-3]
+    assert [term.effect.name for term in saturation.terms] == [
+        "directional_efficiency",
+        "torque_offset",
+        "spring_offset",
+    ]
+    assert [term.effect.name for term in loss.terms] == ["torque_saturation", "torque_offset", "spring_offset"]
+    for own in (saturation.terms[0].effect, loss.terms[0].effect):
+        assert [term.effect.name for term in own.terms] == ["spring_offset"]
+
+
 def in_the_model(robot, planted, parameters):
     """Effects that know each other's values, with the parameters of the whole model."""
     own = (*base_effects(robot), *spring_effects(robot))
