@@ -62,7 +62,7 @@ def named_effects(
             for each in there
             if np.any(each.stds > WIDER * stds)
         ]
-        found = replace(found, unseen=unseen(found.parameters, wider))
+        found = replace(found, unseen=known_least_with(found.parameters, wider))
         out.append(replace(found, transfer=None if transfer is None or not transfer.tested else transfer.share))
     return out
 
@@ -82,7 +82,7 @@ def _joints(selection: Selection) -> set[str]:
     return {effect.joint for effect in selection.effects if effect.joint is not None}
 
 
-def unseen(
+def known_least_with(
     parameters: Sequence[MissingParameter], wider: Sequence[tuple[Effect, Sequence[MissingParameter]]]
 ) -> Unseen | None:
     """What makes the parameters of an effect known least if it is there too; None where nothing makes much of that.

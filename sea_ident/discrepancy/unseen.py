@@ -19,7 +19,7 @@ from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import EffectError
 
 TAKEN_UP = 1e-4
-"""Part of a column, in energy, that a model must leave to say anything of it [-]: the rest of it is rounding."""
+"""Share of the size of a column that a model must leave to say anything of it [-]: less is rounding."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, MissingParameter, Unseen, Verdict
-from sea_ident.discrepancy.named import WIDER, named_effects, unseen
+from sea_ident.discrepancy.named import WIDER, known_least_with, named_effects
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.taken_up import taken_up
@@ -118,8 +118,8 @@ def test_the_one_that_makes_it_known_least_is_told_with_what_it_makes_so():
         (e, [parameter("a", a), parameter("b", b), parameter("held", 9.0)])
         for e, (a, b) in zip(effects, stds, strict=True)
     ]
-    assert unseen(own, wider[:1]) is None
-    assert unseen(own, wider) == Unseen("encoder_offset", "knee", (parameter("b", 3.0 * WIDER),))
+    assert known_least_with(own, wider[:1]) is None
+    assert known_least_with(own, wider) == Unseen("encoder_offset", "knee", (parameter("b", 3.0 * WIDER),))
 
 
 def test_it_is_said_beside_the_effect_and_kept_in_the_file(tmp_path):
