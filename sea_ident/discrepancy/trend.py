@@ -23,9 +23,10 @@ from sea_ident.discrepancy.trend_directions import (
     inside_of_periods,
     steady_rows,
 )
+from sea_ident.discrepancy.trend_left_out import surest_values
 from sea_ident.discrepancy.trend_scatter import column_space, gain, held_basis, scatter_whitener
 from sea_ident.discrepancy.trend_search import Chosen, Sized, as_good, best_trend, find_trends
-from sea_ident.discrepancy.trend_values import CourseValues, course_values
+from sea_ident.discrepancy.trend_values import CourseValues
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.side_by_side import side_by_side
@@ -163,7 +164,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
             )
             flat, numbers, middle, omnibus = later, later @ space, middle[1:], settled
             directions = [d.over(slice(1, None)) for d in directions]
-    scatter = scatter_whitener(numbers, middle)
+    plain, scatter = numbers, scatter_whitener(numbers, middle)
     numbers = numbers @ scatter
     directions = [replace(d, columns=scatter @ d.columns) for d in directions]
     change = _Change(bench, fit)
@@ -177,7 +178,11 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters)
     whole = {cause.name: cause for cause in causes}
 
-    def inside(direction: Direction, found: CourseValues) -> CourseValues:
+    as_seen = np.linalg.inv(scatter)
+
+    def values_of(direction: Direction, beside: Sequence[Direction]) -> CourseValues:
+        own = [replace(d, columns=as_seen @ d.columns).course for d in (direction, *beside)]
+        found = surest_values(plain, own, middle)
         return found.over(columns.inside(direction, found.values, middle, whole[direction.name].temperature))
 
     held = held_basis(
@@ -194,7 +199,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value
-    trends = tuple(_trend(numbers, chosen, k, directions, middle, change, inside) for k in range(len(chosen)))
+    trends = tuple(_trend(numbers, chosen, k, directions, middle, change, values_of) for k in range(len(chosen)))
     soon = [_is_over_soon(bench, c.direction) for c in chosen]
     told = [trend.known(SURE if over else NOT_AT_ALL) for trend, over in zip(trends, soon, strict=True)]
     if not all(told):
@@ -202,7 +207,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
             _not_told(bench, trend, over) for trend, over, known in zip(trends, soon, told, strict=True) if not known
         )
         chosen = [c for c, known in zip(chosen, told, strict=True) if known]
-        trends = tuple(_trend(numbers, chosen, k, directions, middle, change, inside) for k in range(len(chosen)))
+        trends = tuple(_trend(numbers, chosen, k, directions, middle, change, values_of) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 
@@ -339,14 +344,14 @@ def _trend(
     directions: Sequence[Direction],
     middle: FloatArray,
     change: _Change,
-    inside: Callable[[Direction, CourseValues], CourseValues],
+    values_of: Callable[[Direction, Sequence[Direction]], CourseValues],
 ) -> Trend:
     """One of the trends that were chosen, its values beside the others, and what else it could be."""
     own, others = chosen[position], [c for k, c in enumerate(chosen) if k != position]
     direction = own.direction
-    beside = [c.direction.course for c in others]
-    values = inside(direction, course_values(numbers, [direction.course, *beside])[0])
-    held = held_basis([c.direction for c in others])
+    beside = [c.direction for c in others]
+    values = values_of(direction, beside)
+    held = held_basis(beside)
     directions = [d for d in directions if d.name == direction.name or d.name not in {c.direction.name for c in others}]
     alternatives = as_good(numbers, directions, middle, own, held)
     at_start = _at_start(direction, values.values)
@@ -355,7 +360,7 @@ def _trend(
     bends = [d for d in directions if d.name == direction.name and d.bent]
     if bends and not direction.bent:
         bent = max(bends, key=lambda d: gain(numbers, d, held)[0])
-        rival = inside(bent, course_values(numbers, [bent.course, *beside])[0])
+        rival = values_of(bent, beside)
         chance = float(expit(0.5 * (gain(numbers, bent, held)[0] - own.gain - FREE_BEND)))
         stds = _of_either(at_start, stds, _at_start(bent, rival.values), rival.stds, chance)
     return Trend(

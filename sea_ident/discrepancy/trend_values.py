@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
+from sea_ident._typing import FloatArray, IntArray
 from sea_ident.effects.drift import TrendEffect
 
 LOG_STEP = 1e-3
@@ -28,6 +28,11 @@ class Course:
     profile: FloatArray
     columns: FloatArray
     bend: FloatArray | None = None
+
+    def over(self, periods: IntArray) -> "Course":
+        """The same in some of the periods."""
+        profile, bent = self.profile[periods], None if self.bend is None else self.bend[periods]
+        return Course(profile - profile.mean(), self.columns[periods], None if bent is None else bent - bent.mean())
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ import pytest
 from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.trend import _trend
 from sea_ident.discrepancy.trend_directions import Cause, courses
+from sea_ident.discrepancy.trend_left_out import surest_values
 from sea_ident.discrepancy.trend_search import (
     EQUALLY_GOOD,
     FORM,
@@ -29,6 +30,10 @@ def trend(columns, joint, kind="stiffness_drift", temperature=None):
     """All courses of a trend with columns (M,)."""
     each = np.broadcast_to(columns[:, None], (PERIODS, NUMBERS, 1))
     return courses(Cause(make_effect(kind, joint), columns[:, None], temperature), each, MIDDLE)
+
+
+def values_of(flat):
+    return lambda own, beside: surest_values(flat, [d.course for d in (own, *beside)], MIDDLE)
 
 
 def axes(count):
@@ -171,8 +176,7 @@ def test_a_rate_is_as_sure_as_is_said_whether_its_course_bends_or_not(time_const
         chosen = find_trends(flat, directions, MIDDLE, FLOOR, 2, 1e-3, lambda d, v: True)
         # of which nothing is known within a period
         trends = [
-            _trend(flat, chosen, k, directions, MIDDLE, lambda d, v: 0.1, lambda d, found: found)
-            for k in range(len(chosen))
+            _trend(flat, chosen, k, directions, MIDDLE, lambda d, v: 0.1, values_of(flat)) for k in range(len(chosen))
         ]
         scores.extend((t.values[0] - rate) / t.stds[0] for t in trends)
     assert len(scores) > 60

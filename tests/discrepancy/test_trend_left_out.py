@@ -1,0 +1,84 @@
+"""Values of trends are as sure as is said, though their scatter is known from a few periods only."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.trend_left_out import surest_values
+from sea_ident.discrepancy.trend_scatter import scatter_whitener
+from sea_ident.discrepancy.trend_values import Course, course_values
+
+PERIODS, NUMBERS, DRAWS = 20, 12, 80
+MIDDLE = 5.0 * (np.arange(PERIODS) + 0.5)
+PROFILE = MIDDLE / 60.0 - np.mean(MIDDLE / 60.0)
+TRUTH = np.array([8.0, -3.0])
+ONE, OTHER = np.linalg.qr(np.random.default_rng(1).standard_normal((NUMBERS, 2)))[0].T
+FRICTION = np.stack([ONE, 0.95 * ONE + 0.31 * OTHER], axis=1)
+"""Two columns, much alike."""
+
+
+def drawn(rng, columns, scattering, size, turning=0.0):
+    """Numbers of a trend, with scatter along directions (NUMBERS, d), others in every period, beside noise of one."""
+    numbers = np.outer(PROFILE, columns @ TRUTH) + rng.standard_normal((PERIODS, NUMBERS))
+    for own in numbers:
+        turned = scattering + turning * rng.standard_normal(scattering.shape)
+        own += size * turned @ rng.standard_normal(scattering.shape[1])
+    return numbers - numbers.mean(axis=0), [Course(PROFILE, np.broadcast_to(columns, (PERIODS, *columns.shape)))]
+
+
+def weighted(numbers, courses):
+    weights = scatter_whitener(numbers, MIDDLE)
+    return course_values(numbers @ weights, [replace(c, columns=weights @ c.columns) for c in courses])[0]
+
+
+def scores(scattering, size, turning=0.0):
+    """Rms errors in standard deviations as told and by weights alone, and rms errors as told and without weights."""
+    rng = np.random.default_rng(11)
+    told, by_weights, errors = [], [], []
+    for _ in range(DRAWS):
+        numbers, courses = drawn(rng, FRICTION, scattering, size, turning)
+        found, other = surest_values(numbers, courses, MIDDLE), weighted(numbers, courses)
+        told.append((found.values - TRUTH) / found.stds)
+        by_weights.append((other.values - TRUTH) / other.stds)
+        errors.append([found.values - TRUTH, course_values(numbers, courses)[0].values - TRUTH])
+    return (*(np.sqrt(np.mean(np.square(each), axis=0)) for each in (told, by_weights, errors)),)
+
+
+def test_where_friction_scatters_another_way_in_every_period_values_are_as_sure_as_is_said():
+    told, by_weights, _ = scores(np.linalg.qr(FRICTION)[0], 6.0, turning=0.5)
+    assert np.all(told < 1.4)
+    assert np.all(by_weights > 1.8)
+
+
+def test_what_scatters_one_way_is_weighted_out():
+    away = np.linalg.qr(np.concatenate([FRICTION, np.eye(NUMBERS)[:, :1]], axis=1))[0][:, 2]
+    told, _, (own, plain) = scores((0.8 * FRICTION[:, 0] + 0.6 * away)[:, None], 20.0)
+    assert np.all(told < 1.4)
+    assert own[0] < 0.7 * plain[0]
+
+
+def test_without_scatter_both_are_the_same():
+    numbers, courses = drawn(np.random.default_rng(2), FRICTION, np.zeros((NUMBERS, 1)), 0.0)
+    found, plain = surest_values(numbers, courses, MIDDLE), course_values(numbers, courses)[0]
+    assert found.values == pytest.approx(plain.values, rel=1e-6)
+    assert found.stds == pytest.approx(plain.stds, rel=1e-6)
+
+
+def test_a_course_that_bends_keeps_its_weights():
+    numbers, (straight,) = drawn(np.random.default_rng(5), FRICTION, FRICTION, 6.0)
+    bent = replace(straight, bend=PROFILE**2 - np.mean(PROFILE**2))
+    found, other = surest_values(numbers, [bent], MIDDLE), weighted(numbers, [bent])
+    assert found.values == pytest.approx(other.values)
+    # as much less sure as its least sure value
+    assert found.bend_std / other.bend_std == pytest.approx(np.max(found.stds / other.stds))
+
+
+def test_four_periods_say_nothing_of_their_scatter():
+    numbers, (course,) = drawn(np.random.default_rng(2), FRICTION, np.eye(NUMBERS), 1.0)
+    few = course.over(np.arange(4))
+    own = numbers[:4] - numbers[:4].mean(axis=0)
+    weights = scatter_whitener(own, MIDDLE[:4])
+    found = surest_values(own, [few], MIDDLE[:4])
+    other = course_values(own @ weights, [replace(few, columns=weights @ few.columns)])[0]
+    assert found.stds == pytest.approx(other.stds)
