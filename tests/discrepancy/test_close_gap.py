@@ -10,11 +10,11 @@ from sea_ident.discrepancy import close, forward
 from sea_ident.discrepancy.data import wide_processing
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, Verdict
-from sea_ident.discrepancy.forward import command_of, simulation_gap
+from sea_ident.discrepancy.forward import simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, read_model
 from sea_ident.exceptions import DivergenceError, SeaIdentWarning
-from sea_ident.simulation import PlantedEffect, VelocityController
+from sea_ident.simulation import PlantedEffect
 
 PERIOD = 5.0
 NOTHING_LACKS = LackOfFit(0.0, 1, 1.0, 1.0, {})
@@ -102,16 +102,6 @@ def test_without_a_reference_the_measured_motion_stands_in_and_it_is_said(leg, m
     assert "the recording has no reference" in found.notes[0]
     assert found.gaps["q"].shrink > 0.8
     assert set(found.gaps) == {"q", "theta", "tau"}
-
-
-@pytest.mark.scenario
-def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(leg, models, recordings):
-    processed = wide_processing(recordings[1], leg, PERIOD)
-    true = command_of(models[1], recordings[1], processed, VelocityController())
-    assert true.note == ""
-    other = command_of(models[1], recordings[1], processed, VelocityController(bandwidth=20.0, feedforward=0.0))
-    assert "the given controller gives a torque that is" in other.note
-    assert "stand in for the reference" in other.note
 
 
 @pytest.mark.scenario
