@@ -35,7 +35,8 @@ from sea_ident.discrepancy.search import Selection, search, still_needed, withou
 from sea_ident.discrepancy.sensor_limits import limits, steps_cover
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.stand_ins import stand_ins
-from sea_ident.discrepancy.trend import TrendTest, compare_periods, within_periods
+from sea_ident.discrepancy.trend import TrendTest, compare_periods
+from sea_ident.discrepancy.trend_within import within_periods
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects

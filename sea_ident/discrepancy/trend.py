@@ -5,12 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
-from scipy.interpolate import interp1d
 from scipy.special import expit
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.linear import off
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER
@@ -209,47 +207,6 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
         chosen = [c for c, known in zip(chosen, told, strict=True) if known]
         trends = tuple(_trend(numbers, chosen, k, directions, middle, change, values_of) for k in range(len(chosen)))
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
-
-
-def within_periods(
-    bench: Bench, fit: Fit, trends: Sequence[Trend], temperature: FloatArray | None = None
-) -> FloatArray:
-    """Torque of trends in the mean period, beyond what their mean does to the mean motion.
-
-    What drifts from period to period drifts within a period too: its end comes later than its beginning, every time. A
-    mean that closes has little of that left, for towards its end it leads over into the periods before. And where the
-    motion drifts with the torque, the mean of their product is not the product of their means: friction that grows
-    turns a motor later and later, and its mean beside a reversal looks like friction that builds up over a distance.
-
-    Args:
-        bench: the recording.
-        fit: the model.
-        trends: of its periods.
-        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
-
-    Returns:
-        (N, E) torque [N m].
-    """
-    data = bench.data
-    phase = (np.arange(data.samples) + 0.5) / data.samples
-    time = data.starts[:, None] + phase * data.period
-    weights = closing_weights(data.places or range(data.periods), data.samples)
-    total = np.zeros((data.samples, len(data.equations)))
-    for trend in trends:
-        if not isinstance(trend.effect, TrendEffect):
-            continue
-        own = None
-        if temperature is not None and trend.effect.joint is not None:
-            middle = data.starts + 0.5 * data.period
-            each = temperature[:, bench.robot.index(trend.effect.joint)]
-            own = interp1d(middle, each, fill_value="extrapolate")(time.ravel())
-        change = trend.effect.change(time.ravel(), own).reshape(time.shape)
-        course = np.einsum("tp,pt->t", weights, change)
-        values = trend.effect.referred(trend.values, -float(np.mean(change)))
-        for p in range(data.periods):
-            beyond = weights[:, p] * (change[p] - course.mean())
-            total += beyond[:, None] * (data.rows(steady_rows(bench, fit, trend.effect, p)) @ values)
-    return total
 
 
 def _settles(bench: Bench, fit: Fit, noise: NoiseFloor, space: FloatArray, directions: Sequence[Direction]) -> bool:

@@ -9,9 +9,8 @@ import pytest
 from sea_ident.discrepancy import check
 from sea_ident.discrepancy import trend as trend_module
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.closing import closing_weights
 from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import Trend, _is_over_soon, _omnibus, compare_periods, within_periods
+from sea_ident.discrepancy.trend import _is_over_soon, _omnibus, compare_periods
 from sea_ident.effects import effect_classes, make_effect
 from sea_ident.effects.temperature_friction import TemperatureFriction
 from sea_ident.recordings import Recording
@@ -248,67 +247,6 @@ def test_size_of_the_test_of_everything_at_once(nothing_missing):
         flat = rng.standard_normal((10, 400))
         rejected += _omnibus(flat - flat.mean(axis=0), middle, nothing_missing[1].noise) < LEVEL
     assert 0.02 < rejected / DRAWS < 0.09
-
-
-def in_the_mean(data, each):
-    """(N,) mean of what grows by one in every period times (N, P) what each has, without the mean of that growth."""
-    time = np.arange(data.periods) + ((np.arange(data.samples) + 0.5) / data.samples)[:, None]
-    weights = closing_weights(range(data.periods), data.samples)
-    return np.sum(weights * (time - np.mean(np.sum(weights * time, axis=1))) * each, axis=1)
-
-
-def test_a_drift_within_a_period_is_no_effect_of_its_own(softening):
-    """Stiffness that falls all the time is lower at the end of every period: that alone lies far beyond the noise."""
-    bench, now = softening
-    trends = compare_periods(bench, now.fit).trends
-    assert [(t.effect.name, t.effect.joint) for t in trends] == [("stiffness_drift", "hip")]
-    known = within_periods(bench, now.fit, trends)
-    less = Bench(replace(bench.data, known=known), bench.effects)
-    then = settle(less, less.effects)
-    assert then.fit.statistic < now.fit.statistic
-    assert then.fit.statistic / then.fit.dof == pytest.approx(1.0, abs=0.2)
-    # each period's stiffness on its own deflection, but for their means, opposite in the two equations of the hip
-    deflections = np.stack([motion.deflection[:, 0] for motion in bench.data.period_motions], axis=1)
-    torque = -150.0 * bench.data.period / 60.0 * in_the_mean(bench.data, deflections)
-    np.testing.assert_allclose(known[:, 0], torque, rtol=0.1, atol=2e-3)
-    np.testing.assert_allclose(known[:, 1], -known[:, 0])
-    np.testing.assert_array_equal(known[:, 2:], 0.0)
-
-
-@pytest.mark.scenario
-def test_where_the_motion_drifts_with_its_torque_the_mean_of_the_product_is_not_that_of_the_means(laboratory):
-    """A motor that turns later from pass to pass while its friction grows: no friction of the mean motion does that."""
-    data = laboratory.data(laboratory.record(periods=8))
-    later = [
-        replace(motion, dtheta=motion.dtheta + 0.05 * (p - 3.5) * np.array([0.0, 1.0, 0.0]))
-        for p, motion in enumerate(data.period_motions)
-    ]
-    drifting = replace(data, period_motions=tuple(later))
-    bench = Bench(drifting, laboratory.effects)
-    now = settle(bench, bench.effects)
-    effect = bench.anchored(
-        (*now.fit.effects, make_effect("friction_drift", "knee", time_constant=1e8)), now.fit.parameters
-    )[-1]
-    trend = Trend(effect, np.array([0.0, 0.6]), np.zeros(2), 1.0, 0.0, 0.1)
-    known = within_periods(bench, now.fit, [trend])
-    signs = np.stack([np.tanh(motion.dtheta[:, 1] / effect.smoothing) for motion in later], axis=1)
-    expected = 0.6 * data.period / 60.0 * in_the_mean(drifting, signs)
-    np.testing.assert_allclose(known[:, KNEE], expected, rtol=1e-6, atol=1e-9)
-    # much of it is what the mean motion has nothing of
-    alone = 0.6 * data.period / 60.0 * in_the_mean(drifting, np.repeat(signs.mean(axis=1, keepdims=True), 8, axis=1))
-    assert np.linalg.norm(alone - expected) > 0.5 * np.linalg.norm(expected)
-
-
-def test_a_measured_temperature_is_drawn_through_the_periods(laboratory):
-    """Friction of a motor that warms up: its course within a period is that of the temperature, not of a time."""
-    bench = laboratory.bench(laboratory.record(periods=8))
-    now = settle(bench, bench.effects)
-    effect = bench.anchored((*now.fit.effects, make_effect("temperature_friction", "knee")), now.fit.parameters)[-1]
-    trend = Trend(effect, np.array([0.0, 0.1]), np.zeros(2), 1.0, 0.0, 0.1)
-    temperature = np.tile(25.0 + 2.0 * np.arange(8.0)[:, None], (1, 3))
-    known = within_periods(bench, now.fit, [trend], temperature)
-    signs = np.stack([np.tanh(motion.dtheta[:, 1] / effect.smoothing) for motion in bench.data.period_motions], axis=1)
-    np.testing.assert_allclose(known[:, KNEE], 0.1 * 2.0 * in_the_mean(bench.data, signs), atol=1e-12)
 
 
 @pytest.mark.scenario
