@@ -357,6 +357,8 @@ class ParameterFits(Tangents):
     def _plain_whitener(self) -> ComplexArray:
         """(H + 1, E, E) whitening without a noise floor: every equation in its own torque."""
         power = np.sqrt(np.sum(np.abs(self._target) ** 2, axis=0))
+        # a link equation has no torque of its own: next to nothing that is known to act there is no measure of it
+        power[list(self.links)] = 0.0
         typical = float(np.max(power))
         scale = np.diag(1.0 / np.where(power > 0.0, power, typical)).astype(np.complex128)
         return np.broadcast_to(scale, (self.data.harmonics + 1, *scale.shape))

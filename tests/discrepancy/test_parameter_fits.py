@@ -1,6 +1,7 @@
 """Parameters of a model fitted with its shapes held."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,3 +77,14 @@ def test_a_shape_is_refined_beside_what_is_known(laboratory):
     assert found.known is known
     assert found.effects[-1].order == pytest.approx(whole.effects[-2].order, abs=1e-3)
     assert found.statistic == pytest.approx(whole.statistic, rel=1e-4)
+
+
+def test_next_to_nothing_that_is_known_at_a_spring_is_no_measure_of_its_equation(rippled):
+    """Weighted by that, the first fit would do without the spring."""
+    bench = rippled[0]
+    known = np.zeros((bench.data.samples, len(bench.data.equations)))
+    known[:, list(bench.links)] = 1e-7 * np.sin(bench.data.motion.time)[:, None]
+    more = bench.comparing(replace(bench.data, known=known)).first_fit
+    for joint in bench.robot.joint_names:
+        name = f"{joint}.spring_stiffness"
+        assert more.parameters[name] == pytest.approx(bench.first_fit.parameters[name], rel=1e-3)
