@@ -99,7 +99,8 @@ def conclude(
     statistic, dof, p_value = lack_of_fit(confirmed.bench, confirmed.start)
     left, left_dof, left_p = lack_of_fit(confirmed.bench, confirmed.final)
     remainder = remainder_share(confirmed.bench, confirmed.final) if left_p < LACK_LEVEL else 0.0
-    missing = [*named_effects(bench, selection, alternatives, held), *(named_trend(bench, t) for t in trends.trends)]
+    missing = named_effects(bench, selection, alternatives, held, trends.trends)
+    missing.extend(named_trend(bench, trend) for trend in trends.trends)
     # what drifts differs from its first value in the mean too
     drifting = {(t.effect.name, t.effect.joint) for t in trends.trends}
     missing = [m for m in missing if (f"{m.effect}_drift", m.joint) not in drifting]

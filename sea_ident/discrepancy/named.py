@@ -15,10 +15,13 @@ from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.resting import resting
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.trend import Trend
+from sea_ident.discrepancy.trend_directions import steady_rows
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.discrepancy.unseen import beside_others
 from sea_ident.effects import Effect, Shape, Side
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.estimation.spring_untold import told_by_rest, untold
 from sea_ident.estimation.springs import spring_columns
@@ -32,6 +35,7 @@ def named_effects(
     selection: Selection,
     alternatives: dict[int, tuple[Alternative, ...]],
     held: HeldOut | None,
+    trends: Sequence[Trend] = (),
 ) -> list[MissingEffect]:
     """What was added by a search, with the numbers that are told of it.
 
@@ -40,10 +44,12 @@ def named_effects(
         selection: what was found.
         alternatives: what else it may be, by the position among the effects.
         held: how it did on data that was not used.
+        trends: of the periods.
     """
     fit, open_ = selection.final.fit, with_open_powers(bench, selection.final)
     plain, free = uncertainties(bench, open_), open_.fit.free_shapes
-    ambiguous = [_shift(open_.fit, alternative) for alike in alternatives.values() for alternative in alike]
+    other_models = [_shift(open_.fit, alternative) for alike in alternatives.values() for alternative in alike]
+    other_models.extend(_shift_by_the_mean(bench, open_, trend) for trend in trends)
     beside = {joint: tuple(beside_others(bench, open_, joint)) for joint in _joints(selection)}
     first = len(fit.effects) - selection.added
     out = []
@@ -54,7 +60,7 @@ def named_effects(
         transfer = held.transfers[k] if held is not None and held.transfers else None
         others = alternatives.get(position, ())
         there = beside.get(fit.effects[position].joint or "", ())
-        shifts = [*ambiguous, *(each.shift for each in there if each.better)]
+        shifts = [*other_models, *(each.shift for each in there if each.better)]
         stds = np.max([plain, *(np.hypot(plain, shift) for shift in shifts)], axis=0)
         found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free)
         wider = [
@@ -75,6 +81,21 @@ def _shift(fit: Fit, alternative: Alternative) -> FloatArray:
     there = alternative.fit.parameters
     shift[: len(fit.columns)] = [there.get(name, value) - value for name, value in fit.parameters.items()]
     return shift
+
+
+def _shift_by_the_mean(bench: Bench, now: Settled, trend: Trend) -> FloatArray:
+    """(p + s,) by how much parameters are others where the mean of a trend, which nothing takes up, is beside them.
+
+    A torque constant that drifts was as described before it did, or is so in the mean: nobody can tell.
+    """
+    fit, effect = now.fit, trend.effect
+    if not isinstance(effect, TrendEffect) or effect.mean_is_free:
+        return np.zeros(len(fit.columns) + len(fit.free_shapes))
+    middle = bench.data.starts + 0.5 * bench.data.period
+    mean = float(np.mean(effect.change(middle, None)))
+    torque = mean * (bench.spectra_of(steady_rows(bench, fit, effect), fit.effects) @ trend.values)
+    known = bench.whitening(now.noise).flat(torque * fit.scale)
+    return np.asarray(fit.step_factor @ (fit.basis.T @ known), dtype=np.float64)
 
 
 def _joints(selection: Selection) -> set[str]:

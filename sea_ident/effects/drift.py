@@ -19,7 +19,13 @@ class TrendEffect(ABC):
 
     The time of the motion is that of the recording: the columns of one mean period show next to nothing, and the
     comparison of the periods shows it all. A search asks for the two factors separately.
+
+    Attributes:
+        mean_is_free: whether the model has parameters of its own that take up its mean over a recording, as friction
+            and stiffness are; else those of others do.
     """
+
+    mean_is_free: ClassVar[bool] = True
 
     @abstractmethod
     def steady(self, state: State) -> Contribution:

@@ -31,6 +31,7 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
         "Sebastian, Temperature effects on torque production of PM motors, IEEE Trans. Ind. Appl. 1995"
     )
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 20.0, 1e4, points=4),)
+    mean_is_free: ClassVar[bool] = False
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """Initial relative rate of the torque that the record shows."""

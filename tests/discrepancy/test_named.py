@@ -1,14 +1,19 @@
 """What is told of an effect that was found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.named import _as_seen, named_effect, named_effects
+from sea_ident.discrepancy.named import _as_seen, _shift_by_the_mean, named_effect, named_effects
 from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import Settled
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
+from sea_ident.discrepancy.trend import compare_periods
+from sea_ident.discrepancy.trend_within import within_periods
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
+from sea_ident.simulation import FrictionJitter
 
 
 @pytest.mark.parametrize(("share", "known"), [(0.1, True), (0.6, False)])
@@ -76,3 +81,29 @@ def test_what_columns_have_in_common_is_told_of_none_of_them():
         found, off = _as_seen(push, nothing, force[: nothing.shape[2]])
         assert (found == force[: nothing.shape[2]]).all()
         assert not off.any()
+
+
+def test_a_torque_constant_may_have_been_as_described_before_it_drifted_or_in_the_mean(laboratory):
+    """Nothing in the model takes up what it is off by in the mean, so a loss by load does."""
+    planted = [("directional_efficiency", "hip", [0.2], {}), ("torque_constant_drift", "hip", [0.06], {})]
+    bench = laboratory.bench(laboratory.record(planted, periods=12, jitter=FrictionJitter.none()))
+    start = settle(bench, bench.effects)
+    effects = bench.anchored((*start.fit.effects, make_effect("directional_efficiency", "hip")), start.fit.parameters)
+    now = settle_again(bench, bench.fit(effects, start.noise, start=start.fit.parameters))
+    (trend,) = compare_periods(bench, now.fit).trends
+    assert (trend.effect.name, trend.effect.joint) == ("torque_constant_drift", "hip")
+    less = bench.comparing(replace(bench.data, known=within_periods(bench, now.fit, [trend])))
+    now = settle_again(less, now.fit)
+    plain = uncertainties(less, now)[len(now.fit.columns) - 1]
+    (found,) = named_effects(less, Selection(start, now, 1, (0.0,)), {}, None, [trend])
+    (loss,) = found.parameters
+    assert abs(loss.value - 0.2) > 5.0 * plain
+    assert abs(loss.value - 0.2) < 2.0 * loss.std
+    # by as much as it is another one beside what the motor is off by in the mean
+    mean = float(np.mean(trend.effect.change(less.data.starts + 0.5 * less.data.period, None)))
+    known = less.data.known.copy()
+    known[:, 0] += mean * trend.values[0] * less.data.tau_motor[:, 0]
+    more = less.comparing(replace(less.data, known=known))
+    there = more.fit(now.fit.effects, now.noise, start=now.fit.parameters)
+    shift = _shift_by_the_mean(less, now, trend)[len(now.fit.columns) - 1]
+    assert shift == pytest.approx(now.fit.values[-1] - there.values[-1], rel=0.1)
