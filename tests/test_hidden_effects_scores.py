@@ -218,3 +218,25 @@ def test_a_coupling_has_the_friction_of_its_motor() -> None:
         same = known[name] == pytest.approx(-0.1 * truth.coulomb[1])
         assert bool(same) is (engine == "mujoco")
         assert not any("inertia" in each or "smoothing" in each for each in known)
+
+
+@pytest.mark.parametrize(
+    ("joint", "effect", "share"),
+    [("knee", "torque_ripple", 0.8), ("hip", "torque_ripple", 1.0), ("knee", "link_friction", 1.0)],
+)
+def test_a_motor_whose_torque_constant_is_another_one_has_its_friction_as_recorded(
+    joint: str, effect: str, share: float
+) -> None:
+    case = draw_case(1, "none", 0)
+    planted = replace(RIPPLE, effect=effect, shape={"order": 5.0, "phase": 0.3, "viscous": 0.2})
+    constant = Planted("torque_constant", joint, "library", 0.25, {}, gap=0.02, torque_share=0.02)
+    plain, beside = (
+        true_parameters(planted, replace(case, planted=planted_too), truth_of(case))
+        for planted_too in ((planted,), (planted, constant))
+    )
+    amounts = [name for name in plain if not name.endswith("_order")]
+    assert amounts
+    for name in amounts:
+        assert beside[name] == pytest.approx(share * plain[name])
+    own = true_parameters(constant, replace(case, planted=(constant,)), truth_of(case))
+    assert own[f"{joint}.torque_constant"] == pytest.approx(-0.2)

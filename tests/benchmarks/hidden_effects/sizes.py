@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from sea_ident.effects import Effect, Side
 from sea_ident.robot import Robot
 from tests.benchmarks.hidden_effects.case import Case, FloatArray, Planted
 from tests.benchmarks.hidden_effects.plants import Truth, nominal_robot
@@ -19,6 +20,9 @@ NOT_OF_THE_EFFECT = {
     "transmission_coupling": ("_inertia",),
 }
 """Parameters that are friction, stiffness or inertia of the base model, by what follows the name of the effect."""
+
+OF_THE_RECORD = ("torque_constant", "torque_constant_drift", "torque_saturation")
+"""Effects at the motor that are shares of its torque, or of what the record has of it, and no torque of their own."""
 
 HOW_IT_TURNS = ("_smoothing", "_softness")
 """Shapes of how friction turns over, or play ends: each engine has its own form."""
@@ -57,7 +61,8 @@ def true_parameters(planted: Planted, case: Case, truth: Truth) -> dict[str, flo
     robot = truth.robot
     (there, *_) = planted_effects(planted, truth, case.friction_smoothing, case.period, case.periods)
     effect, stem = there.effect, there.effect.parameter_name()
-    known = {column.name: float(value) for column, value in zip(effect.columns(robot), there.values, strict=True)}
+    recorded = _recorded_share(effect, case, truth)
+    known = {column.name: recorded * float(v) for column, v in zip(effect.columns(robot), there.values, strict=True)}
     known |= {effect.parameter_name(shape.name): float(getattr(effect, shape.name)) for shape in effect.ranges}
     if planted.effect == "external_force":
         # it meets the link at its true centre of mass, and is told from where the description has it
@@ -70,6 +75,18 @@ def true_parameters(planted: Planted, case: Case, truth: Truth) -> dict[str, flo
             known[f"{stem}_{kind}_from_{other}"] = planted.size * float(friction[i])
     left_out = {f"{stem}{label}" for label in (*HOW_IT_TURNS, *NOT_OF_THE_EFFECT.get(planted.effect, ()))}
     return {name: value for name, value in known.items() if name.partition("_from_")[0] not in left_out}
+
+
+def _recorded_share(effect: Effect, case: Case, truth: Truth) -> float:
+    """Share of the torque of an effect at a motor that the record has, where the torque constant is another one."""
+    if effect.side is not Side.MOTOR or effect.name in OF_THE_RECORD:
+        return 1.0
+    share = 1.0
+    for planted in case.planted:
+        if planted.effect == "torque_constant" and planted.joint == effect.joint:
+            (there, *_) = planted_effects(planted, truth, case.friction_smoothing, case.period, case.periods)
+            share += float(there.values[0])
+    return share
 
 
 def _centre(robot: Robot, joint: str | None) -> FloatArray:
