@@ -181,7 +181,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     def values_of(direction: Direction, beside: Sequence[Direction]) -> CourseValues:
         own = [replace(d, columns=as_seen @ d.columns).course for d in (direction, *beside)]
         found = surest_values(plain, own, middle)
-        return found.over(columns.inside(direction, found.values, middle, whole[direction.name].temperature))
+        return columns.inside(direction, found, middle, whole[direction.name].temperature)
 
     held = held_basis(
         [replace(c.direction, columns=columns.within(whole[c.direction.name])[-len(flat) :]) for c in chosen]

@@ -12,7 +12,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor
-from sea_ident.discrepancy.trend_values import Course, bend, time_constants
+from sea_ident.discrepancy.trend_values import Course, CourseValues, bend, time_constants
 from sea_ident.effects import Contribution, Effect, corrected_motion, effect_classes
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.load import LoadEffect
@@ -200,17 +200,18 @@ class PeriodColumns:
         return found
 
     def inside(
-        self, direction: Direction, values: FloatArray, middle: FloatArray, temperature: FloatArray | None
-    ) -> float:
-        """Times what a trend is that its values come to where its course is that of the middles of the periods [-].
+        self, direction: Direction, found: CourseValues, middle: FloatArray, temperature: FloatArray | None
+    ) -> CourseValues:
+        """Values of a trend whose course goes on within the periods, from those by a course of their middles.
 
         What bends changes faster in one half of a period than in the other: where its torque is large in the first
-        half, it was seen earlier than in the middle. A straight course makes every period differ by as much from its
-        middle.
+        half, it was seen earlier than in the middle, and where one column is large before another, as friction at a
+        slow turn before a fast one, what changes of the one looks like a change of the other. A straight course makes
+        every period differ by as much from its middle.
 
         Args:
             direction: the trend in its course.
-            values: (k,) by that course.
+            found: values by that course.
             middle: (P,) middles of the periods [s].
             temperature: of its joint in these periods, and perhaps in some before them [degC]; None where it was not
                 measured or does not matter.
@@ -226,13 +227,15 @@ class PeriodColumns:
         change = effect.change(time.ravel(), own).reshape(time.shape)
         course = direction.profile @ change / float(direction.profile @ direction.profile)
         rows = steady_rows(bench, fit, effect)
-        torque = replace(rows, link=(rows.link @ values)[:, :, None], motor=(rows.motor @ values)[:, :, None])
-        weighted = replace(torque, link=torque.link * course[:, None, None], motor=torque.motor * course[:, None, None])
-        seen, taken = (
-            self.flat(bench.spectra_of(part, fit.effects) * fit.scale[:, None])[:, 0] for part in (weighted, torque)
-        )
-        power, common = float(taken @ taken), float(taken @ seen)
-        return common / power if common > 0.0 else 1.0
+        weighted = replace(rows, link=rows.link * course[:, None, None], motor=rows.motor * course[:, None, None])
+        seen, taken = (self.flat(bench.spectra_of(part, fit.effects) * fit.scale[:, None]) for part in (weighted, rows))
+        shown, torque = seen @ found.values, taken @ found.values
+        if not float(torque @ shown) > 0.0:
+            return found
+        # columns times their course, in those that they were taken for
+        mixed = np.linalg.lstsq(taken, seen, rcond=1e-6)[0]
+        factor = float(torque @ shown) / float(torque @ torque)
+        return replace(found, values=np.linalg.solve(mixed, found.values), stds=found.stds / factor)
 
     def within(self, cause: Cause, space: FloatArray | None = None) -> FloatArray:
         """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""

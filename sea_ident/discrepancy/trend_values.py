@@ -49,10 +49,6 @@ class CourseValues:
     stds: FloatArray
     bend_std: float = 0.0
 
-    def over(self, factor: float) -> "CourseValues":
-        """The values of which these are so many times: see `PeriodColumns.inside`."""
-        return replace(self, values=self.values / factor, stds=self.stds / factor)
-
 
 def time_constants(effect: TrendEffect, middle: FloatArray) -> tuple[float, ...]:
     """Time constants worth trying where the middles of the periods (P,) are these [s]; with the last it is straight."""

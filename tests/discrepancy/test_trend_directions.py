@@ -10,6 +10,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend_directions import PeriodColumns, steady_rows, with_course
+from sea_ident.discrepancy.trend_values import Course, CourseValues, course_values
 from sea_ident.effects import make_effect
 
 
@@ -96,6 +97,11 @@ def test_a_softer_spring_carries_less_load_in_what_depends_on_it(softening):
     np.testing.assert_array_equal(rows.link[:, 0, 0], -motion.deflection[:, 0])
 
 
+def told(columns, direction, values, middle, temperature=None):
+    found = CourseValues(np.array(values), np.ones(len(values)))
+    return columns.inside(direction, found, middle, temperature)
+
+
 def test_what_bends_is_seen_when_its_columns_are_large(softening):
     """In a half of a period in which a spring is hardly bent, its stiffness does not show."""
     bench, fit = softening
@@ -103,16 +109,44 @@ def test_what_bends_is_seen_when_its_columns_are_large(softening):
     cause = next(c for c in columns.causes(None) if c.name == ("stiffness_drift", "hip"))
     middle = bench.data.starts + 0.5 * bench.data.period
     straight, bent = (
-        columns.inside(
-            with_course(replace(cause.effect, time_constant=c), columns.within(cause), middle), np.ones(1), middle, None
-        )
+        told(columns, with_course(replace(cause.effect, time_constant=c), columns.within(cause), middle), [1.0], middle)
         for c in (1e6, 20.0)
     )
-    assert straight == pytest.approx(1.0, abs=1e-4)
+    assert straight.values == pytest.approx([1.0], abs=1e-4)
     half = np.exp(0.5 * bench.data.period / 20.0)
-    assert 1.0 / half < bent < half
-    assert abs(bent - 1.0) > 0.005
+    assert 1.0 / half < bent.values[0] < half
+    assert abs(bent.values[0] - 1.0) > 0.005
+    assert bent.stds == pytest.approx(bent.values)
     # a first period that was left out has a temperature all the same
     later, warm = middle[1:], np.linspace(20.0, 30.0, len(middle))
     direction = with_course(replace(cause.effect, time_constant=20.0), columns.within(cause), middle)
-    assert columns.inside(direction.over(slice(1, None)), np.ones(1), later, warm) == pytest.approx(bent, rel=0.02)
+    found = told(columns, direction.over(slice(1, None)), [1.0], later, warm)
+    assert found.values == pytest.approx(bent.values, rel=0.02)
+
+
+def test_columns_that_are_large_one_after_the_other_are_told_apart(softening):
+    """Viscous friction is large where a motor is fast, and what bends has changed more or less by then."""
+    bench, fit = softening
+    noise = bench.noise_of_cut(fit)
+    columns = PeriodColumns(bench, fit, noise)
+    cause = next(c for c in columns.causes(None) if c.name == ("friction_drift", "knee"))
+    middle = bench.data.starts + 0.5 * bench.data.period
+    direction = with_course(replace(cause.effect, time_constant=8.0), columns.within(cause), middle)
+    # what the periods differ by, sample by sample
+    rows, truth = steady_rows(bench, fit, cause.effect), np.array([0.3, -0.5])
+    time = bench.data.starts[:, None] + bench.data.period * (np.arange(bench.data.samples) + 0.5) / bench.data.samples
+    change = direction.effect.change(time, None)[:, :, None, None]
+    periods = [
+        columns.flat(
+            bench.spectra_of(replace(rows, link=rows.link * each, motor=rows.motor * each), fit.effects)
+            * fit.scale[:, None]
+        )
+        @ truth
+        for each in change
+    ]
+    flat = np.stack(periods) - np.mean(periods, axis=0)
+    alike = np.broadcast_to(cause.columns, (len(flat), *cause.columns.shape))
+    (seen,) = course_values(flat, [Course(direction.profile, alike)])
+    found = columns.inside(direction, seen, middle, None)
+    assert np.max(np.abs(seen.values - truth)) > 0.005
+    assert found.values == pytest.approx(truth, abs=5e-4)
