@@ -21,6 +21,9 @@ from sea_ident.exceptions import EffectError
 
 Name = tuple[str, str | None]
 
+SAME_COLUMN = 1e-6
+"""Combinations of the columns of a trend weaker than this share of the strongest are none [-]."""
+
 LOAD_STEP = 1e-4
 """Share of a stiffness by which the change of a load with it is told."""
 
@@ -233,9 +236,10 @@ class PeriodColumns:
         if not float(torque @ shown) > 0.0:
             return found
         # columns times their course, in those that they were taken for
-        mixed = np.linalg.lstsq(taken, seen, rcond=1e-6)[0]
+        mixed = np.linalg.lstsq(taken, seen, rcond=SAME_COLUMN)[0]
+        values = np.linalg.lstsq(mixed, found.values, rcond=SAME_COLUMN)[0]
         factor = float(torque @ shown) / float(torque @ torque)
-        return replace(found, values=np.linalg.solve(mixed, found.values), stds=found.stds / factor)
+        return replace(found, values=values, stds=found.stds / factor)
 
     def within(self, cause: Cause, space: FloatArray | None = None) -> FloatArray:
         """(P, K, k) columns of a trend in every period, in an orthonormal basis (M, K) or as they are."""

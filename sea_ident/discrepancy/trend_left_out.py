@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.trend_scatter import scatter_whitener
@@ -12,6 +13,12 @@ from sea_ident.discrepancy.trend_values import Course, CourseValues, course_valu
 FEWEST = 5
 """Periods from which on one can be left out: fewer say nothing of their scatter."""
 
+MOST_PARTS = 20
+"""Parts of a recording that are left out one by one: of more periods, several at a time."""
+
+SAME = 1e-9
+"""Share of its deviation up to which a value is the same whatever is left out [-]."""
+
 
 def surest_values(numbers: FloatArray, courses: Sequence[Course], middle: FloatArray) -> CourseValues:
     """Values of the first of some trends, as sure as other periods would leave them.
@@ -19,7 +26,7 @@ def surest_values(numbers: FloatArray, courses: Sequence[Course], middle: FloatA
     Weighted by their scatter, values are the best where every period scatters the same way. Friction that turns sooner
     in one period and later in another scatters along other directions in each: a weight turns to where the periods at
     hand happen to scatter little, and values are two to three times less sure than their deviations say. So periods are
-    left out one by one, with their part in the weights (Efron and Tibshirani, An introduction to the bootstrap, chapter
+    left out in turn, with their part in the weights (Efron and Tibshirani, An introduction to the bootstrap, chapter
     11): weighted values are as sure as they are by that beside values without weights, and where these are surer, it is
     those. A course that bends was found with weights, and keeps them.
 
@@ -36,9 +43,12 @@ def surest_values(numbers: FloatArray, courses: Sequence[Course], middle: FloatA
         return weighted
     # with courses as they are: without the first period that of what is over soon says next to nothing
     straight = [replace(course, bend=None) for course in courses]
-    parts = [_without(numbers, straight, middle, k) for k in range(len(numbers))]
-    spread = np.std([course_values(*part[:2])[0].values for part in parts], axis=0)
-    of_weighted = np.std([course_values(*_weighted(*part))[0].values for part in parts], axis=0)
+    count = min(len(numbers), MOST_PARTS)
+    parts = [_without(numbers, straight, middle, np.arange(len(numbers)) % count == k) for k in range(count)]
+    spread, of_weighted = (
+        np.maximum(np.std([course_values(*each)[0].values for each in some], axis=0), SAME * plain.stds)
+        for some in ([part[:2] for part in parts], [_weighted(*part) for part in parts])
+    )
     if all(course.bend is None for course in courses) and np.sum(np.log(spread)) < np.sum(np.log(of_weighted)):
         return plain
     more = np.maximum(plain.stds * of_weighted / (spread * weighted.stds), 1.0)
@@ -46,10 +56,10 @@ def surest_values(numbers: FloatArray, courses: Sequence[Course], middle: FloatA
 
 
 def _without(
-    numbers: FloatArray, courses: Sequence[Course], middle: FloatArray, period: int
+    numbers: FloatArray, courses: Sequence[Course], middle: FloatArray, out: NDArray[np.bool_]
 ) -> tuple[FloatArray, list[Course], FloatArray]:
-    """Numbers, courses and middles of all periods but one."""
-    kept = np.delete(np.arange(len(numbers)), period)
+    """Numbers, courses and middles of all periods but some."""
+    kept = np.flatnonzero(~out)
     own = numbers[kept]
     return own - own.mean(axis=0), [course.over(kept) for course in courses], middle[kept]
 

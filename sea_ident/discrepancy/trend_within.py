@@ -12,6 +12,7 @@ from sea_ident.discrepancy.closing import SIGNALS, closing_weights
 from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import moving, signal_effects
+from sea_ident.discrepancy.linear import span
 from sea_ident.discrepancy.periods import BODIES, add_torque, torques_of
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.trend_directions import steady_rows
@@ -98,7 +99,7 @@ def _on_a_motion_that_drifts(bench: Bench, fit: Fit, courses: Sequence[FloatArra
 def _drifted(data: PeriodData, courses: Sequence[FloatArray], weights: FloatArray) -> list[Motion]:
     """The mean as far from itself in every period as goes with what drifts: what goes by chance is in no model."""
     terms = [course**degree for course in courses for degree in range(1, BEND + 1)]
-    basis = np.linalg.qr(np.stack([np.ones(data.periods), *terms], axis=1))[0]
+    basis = span(np.stack([np.ones(data.periods), *terms], axis=1))
     parts = []
     for name in SIGNALS:
         smooth = np.einsum("pk,rk,rtn->ptn", basis, basis, np.stack([getattr(m, name) for m in data.period_motions]))

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.trend_left_out import surest_values
+from sea_ident.discrepancy import trend_left_out as left_out
+from sea_ident.discrepancy.trend_left_out import MOST_PARTS, surest_values
 from sea_ident.discrepancy.trend_scatter import scatter_whitener
 from sea_ident.discrepancy.trend_values import Course, course_values
 
@@ -82,3 +83,25 @@ def test_four_periods_say_nothing_of_their_scatter():
     found = surest_values(own, [few], MIDDLE[:4])
     other = course_values(own @ weights, [replace(few, columns=weights @ few.columns)])[0]
     assert found.stds == pytest.approx(other.stds)
+
+
+def test_of_many_periods_several_are_left_out_at_a_time(monkeypatch):
+    asked = []
+    monkeypatch.setattr(left_out, "course_values", lambda *given: asked.append(len(given[0])) or course_values(*given))
+    count = 3 * PERIODS + 1
+    rng, middle = np.random.default_rng(4), 5.0 * (np.arange(count) + 0.5)
+    profile = middle - middle.mean()
+    numbers = np.outer(profile, FRICTION @ (0.02 * TRUTH)) + rng.standard_normal((count, NUMBERS))
+    course = Course(profile, np.broadcast_to(FRICTION, (count, *FRICTION.shape)))
+    found = surest_values(numbers - numbers.mean(axis=0), [course], middle)
+    assert sorted(set(asked)) == [count - 4, count - 3, count]
+    assert len(asked) == 2 * (MOST_PARTS + 1)
+    assert np.all(np.abs(found.values - 0.02 * TRUTH) < 4.0 * found.stds)
+
+
+def test_a_value_that_is_the_same_whatever_is_left_out_is_as_sure_as_noise_lets_it_be():
+    exact = np.outer(PROFILE, FRICTION @ TRUTH)
+    (course,) = drawn(np.random.default_rng(1), FRICTION, np.zeros((NUMBERS, 1)), 0.0)[1]
+    found, plain = surest_values(exact, [course], MIDDLE), course_values(exact, [course])[0]
+    assert found.values == pytest.approx(TRUTH)
+    assert found.stds == pytest.approx(plain.stds)
