@@ -10,9 +10,6 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.trend_scatter import scatter_whitener
 from sea_ident.discrepancy.trend_values import Course, CourseValues, course_values
 
-FEWEST = 5
-"""Periods from which on one can be left out: fewer say nothing of their scatter."""
-
 MOST_PARTS = 20
 """Parts of a recording that are left out one by one: of more periods, several at a time."""
 
@@ -26,9 +23,9 @@ def surest_values(numbers: FloatArray, courses: Sequence[Course], middle: FloatA
     Weighted by their scatter, values are the best where every period scatters the same way. Friction that turns sooner
     in one period and later in another scatters along other directions in each: a weight turns to where the periods at
     hand happen to scatter little, and values are two to three times less sure than their deviations say. So periods are
-    left out in turn, with their part in the weights (Efron and Tibshirani, An introduction to the bootstrap, chapter
-    11): weighted values are as sure as they are by that beside values without weights, and where these are surer, it is
-    those. A course that bends was found with weights, and keeps them.
+    left out in turn, with their part in the weights, the courses as they are (Efron and Tibshirani, An introduction to
+    the bootstrap, chapter 11): weighted values are as sure as they are by that beside values without weights, and where
+    these are surer, it is those. A course that bends was found with weights, and keeps them.
 
     Args:
         numbers: (P, K) numbers of every period, without their mean, as they scatter.
@@ -39,12 +36,8 @@ def surest_values(numbers: FloatArray, courses: Sequence[Course], middle: FloatA
         Values and standard deviations.
     """
     plain, weighted = course_values(numbers, courses)[0], course_values(*_weighted(numbers, courses, middle))[0]
-    if len(numbers) < FEWEST:
-        return weighted
-    # with courses as they are: without the first period that of what is over soon says next to nothing
-    straight = [replace(course, bend=None) for course in courses]
     count = min(len(numbers), MOST_PARTS)
-    parts = [_without(numbers, straight, middle, np.arange(len(numbers)) % count == k) for k in range(count)]
+    parts = [_without(numbers, courses, middle, np.arange(len(numbers)) % count == k) for k in range(count)]
     spread, of_weighted = (
         np.maximum(np.std([course_values(*each)[0].values for each in some], axis=0), SAME * plain.stds)
         for some in ([part[:2] for part in parts], [_weighted(*part) for part in parts])

@@ -1,15 +1,20 @@
 """What the motors were told to do: believed where it gives what was measured, whatever the noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sea_ident.discrepancy.command import REPRODUCED, StandIn, command_of
 from sea_ident.discrepancy.data import wide_processing
+from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify
-from sea_ident.simulation import FrictionJitter, SensorNoise, VelocityController, simulate
+from sea_ident.simulation import FrictionJitter, PlantedEffect, SensorNoise, VelocityController, simulate
 from sea_ident.simulation.reference import PeriodicReference
 
 PERIOD = 5.0
+# a model that lacks something says so
+pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +48,9 @@ def test_noise_is_no_other_controller(leg, noisy):
     assert off(leg, VelocityController(), command, processed) > 1.5 * REPRODUCED
     assert command.note == ""
     assert not isinstance(command, StandIn)
+    # of one period its noise is not known
+    one = replace(processed, period_motions=(processed.motion,), period_tau_motor=processed.tau_motor[None])
+    assert "gives a torque that is" in command_of(model, recording, one, None).note
 
 
 @pytest.mark.scenario
@@ -55,3 +63,15 @@ def test_a_controller_that_does_not_give_the_measured_torque_is_not_believed(noi
     assert "the given controller gives a torque that is" in command.note
     assert "stand in for the reference" in command.note
     assert isinstance(command, StandIn)
+
+
+@pytest.mark.scenario
+def test_the_torque_that_motors_gave_is_what_a_controller_must_give(leg, series):
+    """Recorded late it is another one, unless the model knows how late."""
+    late = make_effect("torque_delay", "hip", delay=0.06)
+    planted = [PlantedEffect(late, np.zeros(0))]
+    recording = simulate(leg, series[0], periods=4, effects=planted, jitter=FrictionJitter.none()).recording
+    processed = wide_processing(recording, leg, PERIOD)
+    for effects, believed in ((base_effects(leg), False), ((*base_effects(leg), late), True)):
+        model = identify(leg, recording, effects=effects, period=PERIOD)
+        assert (command_of(model, recording, processed, None).note == "") is believed

@@ -117,6 +117,7 @@ def test_what_bends_is_seen_when_its_columns_are_large(softening):
     assert 1.0 / half < bent.values[0] < half
     assert abs(bent.values[0] - 1.0) > 0.005
     assert bent.stds == pytest.approx(bent.values)
+    assert told(columns, with_course(cause.effect, columns.within(cause), middle), [0.0], middle).values == [0.0]
     # a first period that was left out has a temperature all the same
     later, warm = middle[1:], np.linspace(20.0, 30.0, len(middle))
     direction = with_course(replace(cause.effect, time_constant=20.0), columns.within(cause), middle)

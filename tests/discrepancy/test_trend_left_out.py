@@ -75,14 +75,17 @@ def test_a_course_that_bends_keeps_its_weights():
     assert found.bend_std / other.bend_std == pytest.approx(np.max(found.stds / other.stds))
 
 
-def test_four_periods_say_nothing_of_their_scatter():
-    numbers, (course,) = drawn(np.random.default_rng(2), FRICTION, np.eye(NUMBERS), 1.0)
-    few = course.over(np.arange(4))
-    own = numbers[:4] - numbers[:4].mean(axis=0)
-    weights = scatter_whitener(own, MIDDLE[:4])
-    found = surest_values(own, [few], MIDDLE[:4])
-    other = course_values(own @ weights, [replace(few, columns=weights @ few.columns)])[0]
-    assert found.stds == pytest.approx(other.stds)
+def test_values_that_are_surer_without_weights_have_none(monkeypatch):
+    """Weights that are others whatever period is left out tell nothing but chance."""
+    erratic = np.random.default_rng(9)
+    monkeypatch.setattr(left_out, "scatter_whitener", lambda *_: np.diag(erratic.uniform(0.05, 1.0, NUMBERS)))
+    numbers, (straight,) = drawn(np.random.default_rng(5), FRICTION, FRICTION, 6.0)
+    plain = course_values(numbers, [straight])[0]
+    assert np.all(surest_values(numbers, [straight], MIDDLE).values == plain.values)
+    bent = replace(straight, bend=PROFILE**2 - np.mean(PROFILE**2))
+    found = surest_values(numbers, [bent], MIDDLE)
+    assert not np.any(found.values == plain.values)
+    assert np.all(found.stds > plain.stds)
 
 
 def test_of_many_periods_several_are_left_out_at_a_time(monkeypatch):
@@ -105,3 +108,6 @@ def test_a_value_that_is_the_same_whatever_is_left_out_is_as_sure_as_noise_lets_
     found, plain = surest_values(exact, [course], MIDDLE), course_values(exact, [course])[0]
     assert found.values == pytest.approx(TRUTH)
     assert found.stds == pytest.approx(plain.stds)
+    nothing = surest_values(0.0 * exact, [course], MIDDLE)
+    assert np.all(nothing.values == 0.0)
+    assert nothing.stds == pytest.approx(plain.stds)

@@ -63,7 +63,7 @@ def test_where_the_motion_drifts_with_its_torque_the_mean_of_the_product_is_not_
     """A motor that turns later from pass to pass while its friction grows: no friction of the mean motion does that."""
     data = laboratory.data(laboratory.record(periods=8))
     later = [
-        replace(motion, dtheta=motion.dtheta + 0.05 * (p - 3.5) * np.array([0.0, 1.0, 0.0]))
+        replace(motion, dtheta=motion.dtheta + 0.05 * (p - 3.5 - 0.2 * (p - 3.5) ** 2) * np.array([0.0, 1.0, 0.0]))
         for p, motion in enumerate(data.period_motions)
     ]
     mean, _ = mean_of_periods(later, data.period_tau_motor, range(8))
@@ -84,6 +84,9 @@ def test_where_the_motion_drifts_with_its_torque_the_mean_of_the_product_is_not_
     )
     constant = coulomb * beyond_the_mean(drifting, speeds, lambda speed: np.tanh(speed / effect.smoothing))
     assert np.linalg.norm(known[:, KNEE] - expected - constant) < 0.1 * np.linalg.norm(constant)
+    # another trend of the same course tells no more of how the motion goes
+    twice = within_periods(bench, now.fit, [trend, replace(trend, values=np.zeros(2))])
+    np.testing.assert_allclose(twice, known, atol=1e-9)
     # much of it is what the mean motion has nothing of
     alone = 0.6 * data.period / 60.0 * in_the_mean(drifting, np.repeat(signs.mean(axis=1, keepdims=True), 8, axis=1))
     assert np.linalg.norm(alone - expected) > 0.5 * np.linalg.norm(expected)
