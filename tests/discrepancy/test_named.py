@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import named
+from sea_ident.discrepancy.check import Findings
+from sea_ident.discrepancy.conclude import conclude
+from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.named import _as_seen, _shift_by_the_mean, named_effect, named_effects
 from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.discrepancy.trend import compare_periods
+from sea_ident.discrepancy.trend import TrendTest, compare_periods
 from sea_ident.discrepancy.trend_within import within_periods
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
@@ -110,6 +113,11 @@ def test_a_torque_constant_may_have_been_as_described_before_it_drifted_or_in_th
     there = more.fit(now.fit.effects, now.noise, start=now.fit.parameters)
     shift = _shift_by_the_mean(less, now, trend)[len(now.fit.columns) - 1]
     assert shift == pytest.approx(now.fit.values[-1] - there.values[-1], rel=0.1)
+    # a diagnosis tells it so
+    confirmed = Confirmed(Selection(start, now, 1, (0.0,)), less, start, now)
+    whole = conclude(less, confirmed, TrendTest(0.0, (trend,), False), {}, None, None, Findings(), ())
+    (told,) = next(m for m in whole.missing if m.effect == "directional_efficiency").parameters
+    assert told == loss
     # of friction the model has parameters
     friction = replace(trend, effect=make_effect("friction_drift", "hip"), values=np.array([0.0, 1.0]))
     assert not np.any(_shift_by_the_mean(less, now, friction))
