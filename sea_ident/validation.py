@@ -10,10 +10,11 @@ from scipy.ndimage import binary_dilation
 
 from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
-from sea_ident.estimation import Agreement, Model
+from sea_ident.estimation import Agreement, Model, TrendTerm
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.spring_agreement import SpringAgreement, spring_agreement
-from sea_ident.exceptions import RecordingError
+from sea_ident.estimation.trend_term import trend_torque, trend_torques
+from sea_ident.exceptions import EffectError, RecordingError
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording, process
 from sea_ident.recordings import Recording
@@ -134,9 +135,11 @@ def validate(
         )
     tell("predicting the torque", 0.2)
     observations = Observations(model.robot, model.effects, model.base, processed)
-    predicted = observations.rows @ model.values
+    trends, untold = _followed(model, processed)
+    of_trends, of_each = trend_torques(model.robot, model.effects, trends, processed)
+    predicted = observations.rows @ model.values + of_trends
     used = np.ones(processed.samples, dtype=bool)
-    found = list(processed.warnings)
+    found = [*processed.warnings, *untold]
     if "external_force" in processed.channels:
         used = _free(processed)
         if not np.any(used):
@@ -153,7 +156,7 @@ def validate(
     each = []
     for p, rows in enumerate(observations.each_period() if processed.period_motions else ()):
         tell(f"predicting period {p + 1} of {processed.periods}", 0.2 + 0.6 * p / processed.periods)
-        each.append(processed.period_tau_motor[p] - rows.total @ model.values)
+        each.append(processed.period_tau_motor[p] - rows.total @ model.values - of_each[p])
     tell("comparing the springs", 0.8)
     springs = spring_agreement(observations, model.values, model.springs, used)
     found += [spring.warning for spring in springs if spring.warning]
@@ -175,6 +178,20 @@ def validate(
         units=tuple(joint.torque_unit for joint in model.robot.joints),
         springs=springs,
     )
+
+
+def _followed(model: Model, processed: ProcessedRecording) -> tuple[list[TrendTerm], list[str]]:
+    """The trends that a recording has what it takes for, and what is to be said of the others."""
+    found, texts = [], []
+    some = {kind: values[:2] for kind, values in processed.channels.items()}
+    for trend in model.trends:
+        try:
+            trend_torque(model.robot, model.effects, [trend], processed.motion[:2], some)
+        except EffectError as error:
+            texts.append(f"{processed.source}: {error}; without it all is taken as {trend.effect.moment}")
+        else:
+            found.append(trend)
+    return found, texts
 
 
 def _free(processed: ProcessedRecording) -> NDArray[np.bool_]:

@@ -108,7 +108,10 @@ class ClosedGap:
 
 def _holds(model: Model | None, missing: MissingEffect) -> bool:
     """Whether a model has what was named among its effects."""
-    return model is not None and missing.title in {e.title for e in (*model.effects, *model.spring_effects)}
+    if model is None:
+        return False
+    changing = (trend.effect for trend in model.trends)
+    return missing.title in {effect.title for effect in (*model.effects, *model.spring_effects, *changing)}
 
 
 @one_thread

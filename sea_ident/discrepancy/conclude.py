@@ -100,10 +100,9 @@ def conclude(
     left, left_dof, left_p = lack_of_fit(confirmed.bench, confirmed.final)
     remainder = remainder_share(confirmed.bench, confirmed.final) if left_p < LACK_LEVEL else 0.0
     missing = named_effects(bench, selection, alternatives, held, trends.trends)
-    missing.extend(named_trend(bench, trend) for trend in trends.trends)
+    missing.extend(named_trend(bench, trend) for trend in trends.trends if not trend.in_model)
     # what drifts differs from its first value in the mean too
-    drifting = {(t.effect.name, t.effect.joint) for t in trends.trends}
-    missing = [m for m in missing if (f"{m.effect}_drift", m.joint) not in drifting]
+    missing = [m for m in missing if (f"{m.effect}_drift", m.joint) not in trends.names]
     if change is not None:
         missing.extend(change.missing)
     missing.sort(key=lambda m: -m.torque_share)

@@ -4,7 +4,6 @@ import warnings as python_warnings
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
-from sea_ident._typing import FloatArray
 from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.against import against
@@ -13,6 +12,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
 from sea_ident.discrepancy.breakaway import stiction
 from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.changing import Changing
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude, unexplained
@@ -23,7 +23,6 @@ from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.drifting import drifting
 from sea_ident.discrepancy.edges import stays_on_the_centre
 from sea_ident.discrepancy.findings import Verdict
-from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
@@ -35,8 +34,7 @@ from sea_ident.discrepancy.search import Selection, search, still_needed, withou
 from sea_ident.discrepancy.sensor_limits import limits, steps_cover
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.stand_ins import stand_ins
-from sea_ident.discrepancy.trend import TrendTest, compare_periods
-from sea_ident.discrepancy.trend_within import within_periods
+from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
 from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
@@ -123,16 +121,18 @@ def diagnose(
     wrong = (*check.wrong_columns(robot, model.effects, processed), *other_torque_units(model, processed))
     notes = check.Findings((*notes.warnings, *wrong), fatal=notes.fatal or bool(wrong))
     notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
-    temperature = check.temperatures(recording, data)
+    changing = Changing(
+        check.temperatures(recording, data), tuple((t.effect.name, t.effect.joint) for t in model.trends)
+    )
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
     basic = completed(bench)
     if basic is not None:
-        found = _compared(bench, confirm(bench, basic.selection), temperature)
+        found = _compared(bench, confirm(bench, basic.selection), changing)
     elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful or _in_steps(bench):
-        found = _compared(bench, confirm(bench, _unsearched(bench)), temperature)
+        found = _compared(bench, confirm(bench, _unsearched(bench)), changing)
     else:
-        found = _searched(bench, temperature, tell)
+        found = _searched(bench, changing, tell)
     bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
     alternatives: Alternatives = {}
@@ -145,7 +145,7 @@ def diagnose(
     confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     nameless: tuple[Unnamed, ...] = ()
     if basic is None:
-        drifts = drifting(confirmed.bench, confirmed.final, trends, temperature)
+        drifts = drifting(confirmed.bench, confirmed.final, trends, changing.temperature)
         away = (confirmed.bench, confirmed.final)
         nameless = (*unnamed(bench, selection, held, away), *stand_ins(bench, selection), *drifts)
     as_identified = _as_identified(recording, processed, robot)
@@ -163,7 +163,9 @@ def diagnose(
     tell("writing it down", 0.95)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
+        repaired = repaired.changing(changing.terms(bench, selection.final.fit, trends))
         diagnosis = with_repaired(diagnosis, repaired)
+        diagnosis = replace(diagnosis, trend_gap=changing.gaps(bench, selection.final.fit, trends, held))
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
@@ -184,24 +186,21 @@ class _Found:
     notes: tuple[str, ...] = ()
 
 
-def _compared(
-    bench: Bench, confirmed: Confirmed, temperature: FloatArray | None, notes: tuple[str, ...] = ()
-) -> _Found:
-    final = confirmed.final
-    return _Found(bench, confirmed, compare_periods(confirmed.bench, final.fit, temperature), notes)
+def _compared(bench: Bench, confirmed: Confirmed, changing: Changing, notes: tuple[str, ...] = ()) -> _Found:
+    return _Found(bench, confirmed, changing.compared(confirmed.bench, confirmed.final.fit), notes)
 
 
-def _searched(bench: Bench, temperature: FloatArray | None, tell: Progress) -> _Found:
+def _searched(bench: Bench, changing: Changing, tell: Progress) -> _Found:
     """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
     start = settle(bench, bench.effects)
-    before = compare_periods(bench, start.fit, temperature)
-    less = _less(bench, start.fit, before, temperature)
-    found = _searched_mean(less, temperature, tell, start=start if less is bench else None)
-    if _names(found.trends) != _names(before) and not (less is bench and _lacks_more(found)):
+    before = changing.compared(bench, start.fit)
+    less = changing.less(bench, start.fit, before)
+    found = _searched_mean(less, changing, tell, start=start if less is bench else None)
+    if found.trends.names != before.names and not (less is bench and _lacks_more(found)):
         first = found.confirmed
         nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
-        again = _less(bench, first.final.fit, found.trends, temperature)
-        found = _searched_mean(again, temperature, tell, still_needed(again, first.selection) if nearly else None)
+        again = changing.less(bench, first.final.fit, found.trends)
+        found = _searched_mean(again, changing, tell, still_needed(again, first.selection) if nearly else None)
     bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
     return replace(found, bench=bench, confirmed=confirmed)
 
@@ -214,7 +213,7 @@ def _lacks_more(found: _Found) -> bool:
 
 def _searched_mean(
     bench: Bench,
-    temperature: FloatArray | None,
+    changing: Changing,
     tell: Progress,
     begun: Selection | None = None,
     start: Settled | None = None,
@@ -229,17 +228,7 @@ def _searched_mean(
             bench, confirmed = with_them or (second.bench, second)
             notes = () if with_them else (words.slow_samples(bench.data),)
     tell("comparing the periods", 0.5)
-    return _compared(bench, confirmed, temperature, notes)
-
-
-def _less(bench: Bench, fit: Fit, trends: TrendTest, temperature: FloatArray | None) -> Bench:
-    if not trends.trends:
-        return bench
-    return bench.comparing(replace(bench.data, known=within_periods(bench, fit, trends.trends, temperature)))
-
-
-def _names(trends: TrendTest) -> set[tuple[str, str | None]]:
-    return {(trend.effect.name, trend.effect.joint) for trend in trends.trends}
+    return _compared(bench, confirmed, changing, notes)
 
 
 def _tested(

@@ -27,6 +27,9 @@ from sea_ident.effects import effect_from_dict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import ModelFileError
 
+IN_WORDS = {"training": "training", "holdout": "held out"}
+"""Data on which a gap was measured, for people."""
+
 _LARGEST = 1e100  # magnitude beyond which a number was not written by a diagnosis
 
 
@@ -43,6 +46,8 @@ class Diagnosis:
         training: gap on the recording.
         holdout: gap on the held-out recording (or held-out periods).
         simulation_gap: of forward simulation by signal q, theta, tau; empty where it was not made.
+        trend_gap: what goes with the course of a recording, on it (training) and on another one (holdout) as if that
+            began as it did; empty where nothing changes.
         detectability: what could have been seen.
         next_experiment: what to do about an ambiguous pair.
         warnings: what to know before trusting this.
@@ -69,6 +74,7 @@ class Diagnosis:
     recording: str = ""
     holdout_source: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    trend_gap: Mapping[str, Gap] = field(default_factory=dict)
 
     @property
     def adds(self) -> bool:
@@ -86,7 +92,8 @@ class Diagnosis:
             if m.alternatives:
                 others = ", ".join(f"{a.title} ({a.cos2:.3f})" for a in m.alternatives)
                 lines.append(f"    or: {others}")
-        gaps = {"training": self.training, "held out": self.holdout}
+        gaps = {IN_WORDS["training"]: self.training, IN_WORDS["holdout"]: self.holdout}
+        gaps |= {f"from period to period, {IN_WORDS[label]}": gap for label, gap in self.trend_gap.items()}
         gaps |= {f"forward simulation of {kind}": gap for kind, gap in self.simulation_gap.items()}
         for label, gap in gaps.items():
             if gap is not None:
@@ -132,6 +139,7 @@ class Diagnosis:
                 "shrink_holdout": None if self.holdout is None else self.holdout.shrink,
             },
             "simulation_gap": {kind: _gap_to_dict(gap) for kind, gap in self.simulation_gap.items()},
+            "trend_gap": {label: _gap_to_dict(gap) for label, gap in self.trend_gap.items()},
             "detectability": [
                 {
                     "effect": d.effect, "joint": d.joint, "smallest": d.smallest if np.isfinite(d.smallest) else None,
@@ -268,6 +276,7 @@ def _from_dict(record: Mapping[str, Any]) -> Diagnosis:
         training=training if training is not None and training.before else None,
         holdout=_gap_from_dict(gap["holdout"], units),
         simulation_gap={k: _gap(g, units) for k, g in record["simulation_gap"].items()},
+        trend_gap={label: _gap(g, units) for label, g in record.get("trend_gap", {}).items() if label in IN_WORDS},
         detectability=tuple(
             Detectability(
                 d["effect"], d["joint"], float("inf") if d["smallest"] is None else _finite(d["smallest"]), d["unit"],

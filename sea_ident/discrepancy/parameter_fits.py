@@ -343,12 +343,16 @@ class ParameterFits(Tangents):
         All harmonics and equations count alike, whatever their noise: where something is missing, it would be spread to
         where there is more noise, and to the samples of other equations that share it.
         """
+        return self.cleaned(fit.residual)
+
+    def cleaned(self, residual: ComplexArray) -> ComplexArray:
+        """(H + 1, E) residuals without what the samples that are left out put into them."""
         free = self._free.spectra
         if not self._free.count:
-            return fit.residual
-        amounts = stacked(free).T @ stacked(fit.residual)  # the columns are orthonormal
-        cleaned: ComplexArray = fit.residual - free @ amounts
-        return cleaned
+            return residual
+        amounts = stacked(free).T @ stacked(residual)  # the columns are orthonormal
+        found: ComplexArray = residual - free @ amounts
+        return found
 
     def whitener(self, noise: NoiseFloor | None) -> ComplexArray:
         """(H + 1, E, E) whitening of a noise floor."""

@@ -10,7 +10,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.estimation import Model
+from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.side_by_side import side_by_side
@@ -33,6 +33,10 @@ class Repaired:
     model: Model | None
     gaps: dict[str, Gap]
     notes: tuple[str, ...]
+
+    def changing(self, trends: tuple[TrendTerm, ...]) -> "Repaired":
+        """The same with a model that holds what changes in the course of a recording; it was simulated in its mean."""
+        return self if self.model is None else replace(self, model=replace(self.model, trends=trends))
 
 
 def repair(

@@ -1,6 +1,6 @@
 """What changes from period to period, and is invisible in the mean."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER
 from sea_ident.discrepancy.noise import NoiseFloor, noise_directions, step_freedom
 from sea_ident.discrepancy.trend_directions import (
     Direction,
+    Name,
     PeriodColumns,
     courses,
     flat_periods,
@@ -81,6 +82,7 @@ class Trend:
         torque_change: rms over periods of the change, as a share of the torque [-].
         alternatives: others that explain the same, with the share of it that they explain.
         time_constant_std: standard deviation of the time constant [s]; 0 where there is none or the course is straight.
+        in_model: whether the model that was diagnosed has it.
     """
 
     effect: Effect
@@ -91,6 +93,12 @@ class Trend:
     torque_change: float
     alternatives: tuple[tuple[Effect, float], ...] = ()
     time_constant_std: float = 0.0
+    in_model: bool = False
+
+    @property
+    def name(self) -> Name:
+        """Effect and joint."""
+        return self.effect.name, self.effect.joint
 
     def known(self, deviations: float) -> bool:
         """Whether any value differs from zero by so many of its standard deviations."""
@@ -114,6 +122,11 @@ class TrendTest:
     notes: tuple[str, ...] = ()
 
     @property
+    def names(self) -> set[Name]:
+        """Effects and joints of what is named."""
+        return {trend.name for trend in self.trends}
+
+    @property
     def torque_change(self) -> float:
         """By how much all that is named changes the torque, as a share of it [-]: no more of it is in the mean."""
         return sum(trend.torque_change for trend in self.trends)
@@ -123,13 +136,16 @@ class TrendTest:
         return bool(self.trends) and not self.unnamed and remainder <= self.torque_change
 
 
-def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = None) -> TrendTest:
+def compare_periods(
+    bench: Bench, fit: Fit, temperature: FloatArray | None = None, known: Collection[Name] = ()
+) -> TrendTest:
     """Test the residuals of the periods for a trend, and name it.
 
     Args:
         bench: the recording.
         fit: the model.
         temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+        known: trends that the model has.
 
     Returns:
         The trends.
@@ -173,7 +189,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
         beside = max((change(*each) for each in others if each.direction.effect.joint == joint), default=0.0)
         return change(*own) >= max(SMALLEST_CHANGE, BESIDE_ANOTHER * beside)
 
-    chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters)
+    chosen = find_trends(numbers, directions, middle, noise, MOST_TRENDS, LEVEL, matters, known)
     whole = {cause.name: cause for cause in causes}
 
     as_seen = np.linalg.inv(scatter)
@@ -191,7 +207,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
     if unnamed and chosen:
         unexplained = trend_excess(left, middle)
         while len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
-            chosen = find_trends(numbers, directions, middle, noise, len(chosen) - 1, LEVEL, matters)
+            chosen = find_trends(numbers, directions, middle, noise, len(chosen) - 1, LEVEL, matters, known)
         if unexplained > UNEXPLAINED * trend_excess(flat, middle):
             chosen = []
     column_p = min((c.p_value for c in chosen), default=1.0)
@@ -206,6 +222,7 @@ def compare_periods(bench: Bench, fit: Fit, temperature: FloatArray | None = Non
         )
         chosen = [c for c, known in zip(chosen, told, strict=True) if known]
         trends = tuple(_trend(numbers, chosen, k, directions, middle, change, values_of) for k in range(len(chosen)))
+    trends = tuple(replace(trend, in_model=trend.name in known) for trend in trends)
     return TrendTest(min(1.0, 2.0 * min(omnibus, column_p)), trends, unnamed, notes)
 
 

@@ -157,6 +157,7 @@ def find_trends(
     most: int,
     level: float,
     matters: Callable[[Sized, Sequence[Sized]], bool],
+    known: Collection[Name] = (),
 ) -> list[Chosen]:
     """Trends that are there, the strongest first.
 
@@ -171,12 +172,18 @@ def find_trends(
         most: largest number.
         level: of the probability of naming one where there is none.
         matters: whether a trend with its values is worth a name beside others with theirs.
+        known: trends that the model has: where they are there, no other takes their place.
 
     Returns:
         The trends.
     """
     named: list[Chosen] = []
-    for _ in range(most):
+    for name in known:
+        own_courses = [d for d in directions if d.name == name]
+        if own_courses:
+            new = best_trend(periods, own_courses, middle, noise, [c.direction for c in named])
+            named.extend([new] if new.p_value <= level else [])
+    for _ in range(most - len(named)):
         others = [c.direction for c in named]
         if len({d.name for d in directions} - {d.name for d in others}) == 0:
             break
@@ -189,7 +196,7 @@ def find_trends(
         if not matters(own, beside):
             directions = [d for d in directions if d.name != own.direction.name]
             continue
-        named = _exchanged(periods, directions, middle, noise, [*named, new])
+        named = _exchanged(periods, directions, middle, noise, [*named, new], known)
         if any(c.p_value > level for c in named):
             named = [c for c in named if c.p_value <= level]
             break
@@ -197,14 +204,21 @@ def find_trends(
 
 
 def _exchanged(
-    periods: FloatArray, directions: Sequence[Direction], middle: FloatArray, noise: NoiseFloor, named: list[Chosen]
+    periods: FloatArray,
+    directions: Sequence[Direction],
+    middle: FloatArray,
+    noise: NoiseFloor,
+    named: list[Chosen],
+    known: Collection[Name],
 ) -> list[Chosen]:
-    """Every trend in turn replaced by what explains most beside the others."""
+    """Every trend in turn replaced by what explains most beside the others, those of the model by their best course."""
     for _ in range(ROUNDS):
         before = [c.direction.name for c in named]
         for k in range(len(named)):
             others = [c.direction for i, c in enumerate(named) if i != k]
-            named[k] = best_trend(periods, directions, middle, noise, others)
+            held = named[k].direction.name in known
+            own = [d for d in directions if d.name == named[k].direction.name] if held else directions
+            named[k] = best_trend(periods, own, middle, noise, others)
         if [c.direction.name for c in named] == before:
             break
     return named

@@ -62,7 +62,7 @@ def bend(effect: TrendEffect, middle: FloatArray, temperature: FloatArray | None
     """(P,) change of the course with the logarithm of its time constant, without mean."""
     constant: float = effect.time_constant  # type: ignore[attr-defined]
     after, before = (
-        replace(effect, time_constant=constant * np.exp(step)).change(middle, temperature)  # type: ignore[type-var]
+        replace(effect, time_constant=constant * np.exp(step)).change(middle, temperature)  # type: ignore[call-arg]
         for step in (LOG_STEP, -LOG_STEP)
     )
     change: FloatArray = (after - before) / (2.0 * LOG_STEP)

@@ -47,25 +47,42 @@ def within_periods(
     """
     data = bench.data
     middle = data.starts + 0.5 * data.period
-    phase = (np.arange(data.samples) + 0.5) / data.samples
-    time = data.starts[:, None] + phase * data.period
     weights = closing_weights(data.places or range(data.periods), data.samples)
     total, courses = np.zeros((data.samples, len(data.equations))), []
     for trend in trends:
         if not isinstance(trend.effect, TrendEffect):
             continue
-        own = None
-        if temperature is not None and trend.effect.joint is not None:
-            each = temperature[:, bench.robot.index(trend.effect.joint)]
-            own = interp1d(middle, each, fill_value="extrapolate")
-        change = trend.effect.change(time.ravel(), None if own is None else own(time.ravel())).reshape(time.shape)
+        change = changes(data, trend.effect, temperature)
         course = np.einsum("tp,pt->t", weights, change)
         values = trend.effect.referred(trend.values, -float(np.mean(change)))
         for p in range(data.periods):
             beyond = weights[:, p] * (change[p] - course.mean())
             total += beyond[:, None] * (data.rows(steady_rows(bench, fit, trend.effect, p)) @ values)
-        courses.append(trend.effect.change(middle, None if own is None else own(middle)))
+        courses.append(trend.effect.change(middle, of_joint(data, trend.effect, temperature)))
     return total + _on_a_motion_that_drifts(bench, fit, courses, weights)
+
+
+def changes(data: PeriodData, effect: TrendEffect, temperature: FloatArray | None) -> FloatArray:
+    """(P, N) change of a trend at every sample of every period.
+
+    Args:
+        data: the recording.
+        effect: the trend.
+        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+    """
+    phase = (np.arange(data.samples) + 0.5) / data.samples
+    time = (data.starts[:, None] + phase * data.period).ravel()
+    own = of_joint(data, effect, temperature)
+    if own is not None:
+        own = interp1d(data.starts + 0.5 * data.period, own, fill_value="extrapolate")(time)
+    return effect.change(time, own).reshape(data.periods, data.samples)
+
+
+def of_joint(data: PeriodData, effect: TrendEffect, temperature: FloatArray | None) -> FloatArray | None:
+    """(P,) temperature of the joint of a trend [degC], None where it was not measured or does not matter."""
+    if temperature is None or effect.joint is None:
+        return None
+    return temperature[:, data.robot.index(effect.joint)]
 
 
 def _on_a_motion_that_drifts(bench: Bench, fit: Fit, courses: Sequence[FloatArray], weights: FloatArray) -> FloatArray:

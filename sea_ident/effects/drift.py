@@ -1,20 +1,20 @@
 """Effects that change in the course of a recording."""
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import SimulationState
-from sea_ident.effects.base import JointEffect, Shape
+from sea_ident.effects.base import Effect, JointEffect, Shape
 from sea_ident.effects.state import Contribution, State
 
 _MINUTE = 60.0
 
 
-class TrendEffect(ABC):
+class TrendEffect(Effect):
     """An effect that is a column times a change in time.
 
     The time of the motion is that of the recording: the columns of one mean period show next to nothing, and the
@@ -39,6 +39,18 @@ class TrendEffect(ABC):
         """Values (k,) for columns of a time at which less has changed, by `change`: where columns drift themselves."""
         return values
 
+    @abstractmethod
+    def about(self, change: float) -> Self:
+        """The same, counted from where it has changed by so much: there it is none.
+
+        What a model has in the mean of a recording is that of such a moment.
+        """
+
+    @property
+    def moment(self) -> str:
+        """Where it is none, and how it goes on, for people."""
+        return "in the mean of a recording"
+
 
 def warming(time: FloatArray, time_constant: float) -> FloatArray:
     """Change at the times (any shape) [s] that starts at a rate of one per minute and ends with a time constant.
@@ -49,16 +61,47 @@ def warming(time: FloatArray, time_constant: float) -> FloatArray:
     return amount
 
 
+class DriftInTime(TrendEffect):
+    """A change in time that begins with the recording, and ends with a time constant.
+
+    Attributes:
+        time_constant: of the drift [s].
+        reference: time at which it is none [s].
+    """
+
+    time_constant: float
+    reference: float
+
+    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
+        """The drift."""
+        at_reference = warming(np.array(self.reference), self.time_constant)
+        return np.asarray(warming(time, self.time_constant) - at_reference, dtype=np.float64)
+
+    def about(self, change: float) -> Self:
+        """With the time at which that is reached as its reference."""
+        # of all that it will change by, the share that it has by then
+        share = change * _MINUTE / self.time_constant - float(np.expm1(-self.reference / self.time_constant))
+        reference = -self.time_constant * float(np.log1p(-share))
+        return replace(self, reference=reference)  # type: ignore[call-arg]
+
+    @property
+    def moment(self) -> str:
+        """Where it is none, and how it goes on, for people."""
+        return f"{self.reference:.4g} s after a recording begins, with a time constant of {self.time_constant:.4g} s"
+
+
 @dataclass(frozen=True)
-class DriftEffect(JointEffect, TrendEffect):
+class DriftEffect(JointEffect, DriftInTime):
     """Columns of a joint, as `local_columns` gives them, times a change in time.
 
     Attributes:
         joint: joint at which it acts.
         time_constant: of the drift [s].
+        reference: time at which it is none [s].
     """
 
     time_constant: float = 1e4
+    reference: float = 0.0
 
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("time_constant", "s", 20.0, 1e4, points=4),)
 
@@ -66,16 +109,12 @@ class DriftEffect(JointEffect, TrendEffect):
         """Columns for a change of one."""
         return JointEffect.evaluate(self, state)
 
-    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
-        """The drift."""
-        return warming(time, self.time_constant)
-
     def evaluate(self, state: State) -> Contribution:
         """Columns times the drift."""
         rows = self.steady(state)
-        change = warming(state.motion.time, self.time_constant)[:, None, None]
+        change = self.change(state.motion.time, None)[:, None, None]
         return Contribution(rows.link * change, rows.motor * change, rows.joint)
 
     def present_columns(self, state: SimulationState) -> FloatArray:
         """Columns times the drift."""
-        return super().present_columns(state) * warming(np.array(state.time), self.time_constant)
+        return super().present_columns(state) * self.change(np.array(state.time), None)

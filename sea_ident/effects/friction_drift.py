@@ -19,6 +19,7 @@ class FrictionDrift(DriftEffect):
     Attributes:
         joint: joint at which it acts.
         time_constant: of the drift [s].
+        reference: time at which it is none [s].
         smoothing: speed around which the sign is smoothed [rad/s] or [m/s].
     """
 

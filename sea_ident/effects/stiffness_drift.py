@@ -17,6 +17,7 @@ class StiffnessDrift(DriftEffect):
     Attributes:
         joint: joint at which it acts.
         time_constant: of the drift [s].
+        reference: time at which it is none [s].
     """
 
     name: ClassVar[str] = "stiffness_drift"

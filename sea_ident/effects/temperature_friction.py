@@ -76,6 +76,15 @@ class TemperatureFriction(JointEffect, TrendEffect):
             raise EffectError(f"the effect {self.name!r} needs the channel temperature_{self.joint} [degC]")
         return temperature - self.reference
 
+    @property
+    def moment(self) -> str:
+        """Where it is none, for people."""
+        return f"at {self.reference:.4g} degC"
+
+    def about(self, change: float) -> "TemperatureFriction":
+        """With that temperature as T_0, which it has in a simulation throughout."""
+        return replace(self, reference=self.reference + change, rise=0.0)
+
     def anchored(self, anchor: Anchor) -> "TemperatureFriction":
         """With the smoothing of the model's Coulomb friction."""
         return replace(self, smoothing=anchor.smoothing(self.required_joint) or self.smoothing)

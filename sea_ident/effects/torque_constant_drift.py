@@ -8,22 +8,24 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, JointAction, SimulationState
 from sea_ident.effects.base import Column, Shape
-from sea_ident.effects.drift import TrendEffect, warming
+from sea_ident.effects.drift import DriftInTime
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True)
-class TorqueConstantDrift(LoadEffect, TrendEffect):
+class TorqueConstantDrift(LoadEffect, DriftInTime):
     """tau_m times the drift, in the motor row.
 
     Attributes:
         joint: joint at which it acts.
         time_constant: of the drift [s].
+        reference: time at which it is none [s].
     """
 
     time_constant: float = 1e4
+    reference: float = 0.0
 
     name: ClassVar[str] = "torque_constant_drift"
     side: ClassVar[Side] = Side.MOTOR
@@ -40,7 +42,7 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
 
     def evaluate(self, state: State) -> Contribution:
         """Motor torque times the drift."""
-        column = self.motor_torque(state) * warming(state.motion.time, self.time_constant)
+        column = self.motor_torque(state) * self.change(state.motion.time, None)
         return state.at(self.side, self.at, column[:, None])
 
     def steady(self, state: State) -> Contribution:
@@ -48,10 +50,6 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
         measured = None if state.channels is None else state.channels.get("tau_motor")
         torque = self.motor_torque(state) if measured is None else measured[:, state.robot.index(self.at)]
         return state.at(self.side, self.at, torque[:, None])
-
-    def change(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
-        """The drift."""
-        return warming(time, self.time_constant)
 
     def referred(self, values: FloatArray, change: float) -> FloatArray:
         """The measured torque drifts as the constant does: it is another share of what was measured before."""
@@ -61,6 +59,6 @@ class TorqueConstantDrift(LoadEffect, TrendEffect):
         """The part of the commanded torque that is lost."""
 
         def columns(state: SimulationState) -> FloatArray:
-            return (state.tau_motor * warming(np.array(state.time), self.time_constant))[:, None]
+            return (state.tau_motor * self.change(np.array(state.time), None))[:, None]
 
         return JointAction(robot.index(self.at), self.side.shares, columns, values, of_speed=False)

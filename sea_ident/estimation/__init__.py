@@ -23,6 +23,7 @@ from sea_ident.estimation.physical import physical_parameters
 from sea_ident.estimation.physical_result import Box, PhysicalParameters, Pull
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.springs import identify_springs
+from sea_ident.estimation.trend_term import TrendTerm
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.estimation.update import Change, Update, updated
 
@@ -49,6 +50,7 @@ __all__ = [
     "Robust",
     "SpringResult",
     "SpringTerm",
+    "TrendTerm",
     "Uncertainty",
     "Update",
     "Verdict",

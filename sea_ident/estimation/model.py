@@ -13,7 +13,8 @@ from sea_ident.base_parameters import BaseParameters
 from sea_ident.effects import Effect
 from sea_ident.estimation.agreement import Agreement
 from sea_ident.estimation.observations import base_rows
-from sea_ident.estimation.spring_result import SpringResult
+from sea_ident.estimation.spring_result import SpringResult, SpringTerm
+from sea_ident.estimation.trend_term import TrendTerm, trend_torque
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -113,6 +114,7 @@ class Model:
         excerpt: thinned data.
         recording: where the data came from.
         update: how an earlier model entered, None where none did.
+        trends: what changes in the course of a recording; all else is as in the mean of the one it was identified from.
         notes: what was done.
         warnings: what a user should know before trusting it.
     """
@@ -130,6 +132,7 @@ class Model:
     excerpt: Excerpt
     recording: str
     update: "Update | None" = None
+    trends: tuple[TrendTerm, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -174,7 +177,7 @@ class Model:
     def parameters(self) -> tuple[Parameter, ...]:
         """Rotor inertias, friction and every other effect's parameters that the data tell apart from the bodies.
 
-        Those of further effects in the springs follow those of the motor torque.
+        Those of further effects in the springs follow those of the motor torque, then those of trends.
         """
         from sea_ident.regressor import prior_parameters
 
@@ -196,7 +199,8 @@ class Model:
                     prior=known if np.isfinite(known) else None,
                 )
             )
-        for term in (term for spring in self.springs for term in spring.terms):
+        beside: list[SpringTerm | TrendTerm] = [term for spring in self.springs for term in spring.terms]
+        for term in (*beside, *self.trends):
             for column, value, std in zip(term.effect.columns(self.robot), term.values, term.stds, strict=True):
                 found.append(Parameter(column.name, column.joint, column.effect, value, std, column.unit, None))
         return tuple(found)
@@ -205,20 +209,40 @@ class Model:
         """Motor torque of a motion.
 
         Args:
-            motion: (N, n).
+            motion: (N, n); where the model has trends, its times are those since a recording began [s].
             channels: further measured signals (N, n) by kind, for effects that need them.
 
         Returns:
             (N, n) motor torque at the joint side [N m] or [N].
+
+        Raises:
+            EffectError: a signal that an effect needs is not among the channels.
         """
         torque: FloatArray = base_rows(self.robot, self.effects, self.base, motion, channels) @ self.values
-        return torque
+        return torque + self._of_trends(motion, channels)[0]
 
-    def predict_std(self, motion: Motion) -> FloatArray:
-        """(N, n) standard deviation of the predicted torque, from the uncertainty of the parameters alone [N m]."""
-        rows = base_rows(self.robot, self.effects, self.base, motion)
+    def predict_std(self, motion: Motion, channels: Mapping[str, FloatArray] | None = None) -> FloatArray:
+        """(N, n) standard deviation of the predicted torque, from the uncertainty of the parameters alone [N m].
+
+        Args:
+            motion: (N, n), as for `predict`.
+            channels: the same.
+
+        Raises:
+            EffectError: a signal that an effect needs is not among the channels.
+        """
+        rows = base_rows(self.robot, self.effects, self.base, motion, channels)
         variance = np.einsum("knb,bc,knc->kn", rows, self.covariance, rows)
+        variance += self._of_trends(motion, channels)[1]
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)), dtype=np.float64)
+
+    def _of_trends(
+        self, motion: Motion, channels: Mapping[str, FloatArray] | None
+    ) -> tuple[FloatArray, FloatArray | float]:
+        """(N, n) torque of the trends and its variance."""
+        if not self.trends:
+            return np.zeros((len(motion), self.robot.n)), 0.0
+        return trend_torque(self.robot, self.effects, self.trends, motion, channels)
 
     def summary(self) -> str:
         """Parameters with intervals, springs, fit and warnings."""
@@ -235,6 +259,7 @@ class Model:
         if any(name.endswith("*") for name in self.names):
             lines.append("  * and other parameters that only act together with it: `sea-ident inspect` lists which")
         lines.extend(f"  spring {spring.summary()}" for spring in self.springs)
+        lines.extend(f"  trend {trend.summary(self.robot)}" for trend in self.trends)
         near = None if self.fit.agreement is None else self.fit.agreement.words()
         for i, joint in enumerate(self.robot.joints):
             lines.append(

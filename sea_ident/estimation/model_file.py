@@ -17,8 +17,9 @@ from sea_ident.effects import Side, effect_from_dict
 from sea_ident.estimation.agreement import Agreement
 from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.spring_result import SpringLack, SpringResult, SpringTerm, Verdict
+from sea_ident.estimation.trend_term import TrendTerm
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
-from sea_ident.estimation.update import Change, Update
+from sea_ident.estimation.update import Update
 from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError
 from sea_ident.motion import Motion
 from sea_ident.regressor import model_columns
@@ -27,7 +28,12 @@ from sea_ident.robot import Robot, robot_from_text
 FORMAT = "sea_ident model"
 VERSION = 1
 VERSION_WITH_SPRING_EFFECTS = 2
-"""Of models that hold more in a spring than stiffness and damping; others are written as before."""
+"""Of models that hold more in a spring than stiffness and damping, ..."""
+
+VERSION_WITH_TRENDS = 3
+"""... and of those that hold what changes in the course of a recording; others are written as before."""
+
+VERSIONS = (VERSION, VERSION_WITH_SPRING_EFFECTS, VERSION_WITH_TRENDS)
 
 LARGEST_FILE = 256 * 2**20
 
@@ -40,7 +46,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
     half = model.uncertainty.half_width()
     return {
         "format": FORMAT,
-        "version": VERSION_WITH_SPRING_EFFECTS if model.spring_effects else VERSION,
+        "version": _version(model),
         "robot": robot.name,
         "joints": list(names),
         "effects": [effect.to_dict() for effect in (*model.effects, *model.spring_effects)],
@@ -89,6 +95,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             for p in model.parameters
         ],
         "springs": [_spring_to_dict(spring) for spring in model.springs],
+        "trends": [trend.to_dict() for trend in model.trends],
         "base": {
             "independent": [base.columns[k].name for k in base.independent],
             "grouping": base.grouping.tolist(),
@@ -105,10 +112,16 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "annotation": robot.annotation,
             "joints": list(names),
         },
-        "update": None if model.update is None else _update_to_dict(model.update),
+        "update": None if model.update is None else model.update.to_dict(),
         "notes": list(model.notes),
         "warnings": list(model.warnings),
     }
+
+
+def _version(model: Model) -> int:
+    if model.trends:
+        return VERSION_WITH_TRENDS
+    return VERSION_WITH_SPRING_EFFECTS if model.spring_effects else VERSION
 
 
 def write_model(model: Model, path: str | Path) -> None:
@@ -148,10 +161,10 @@ def read_model(path: str | Path) -> Model:
         raise ModelFileError(f"{path}: is not JSON: {error}; is it a MODEL.json, whole?") from None
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise ModelFileError(f"{path}: is not a model of sea_ident; identify writes one")
-    if record.get("version") not in (VERSION, VERSION_WITH_SPRING_EFFECTS):
+    if record.get("version") not in VERSIONS:
         raise ModelFileError(
-            f"{path}: has version {record.get('version')!r}; this version of sea_ident reads {VERSION} and "
-            f"{VERSION_WITH_SPRING_EFFECTS}. Identify again"
+            f"{path}: has version {record.get('version')!r}; this version of sea_ident reads {VERSIONS[0]} to "
+            f"{VERSIONS[-1]}. Identify again"
         )
     try:
         return model_from_dict(record)
@@ -233,7 +246,8 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
         ),
         excerpt=_excerpt_from_dict(record["excerpt"], robot),
         recording=str(record["recording"]),
-        update=None if record["update"] is None else _update_from_dict(record["update"]),
+        update=None if record["update"] is None else Update.from_dict(record["update"]),
+        trends=tuple(TrendTerm.from_dict(entry, robot) for entry in record.get("trends", ())),
         notes=tuple(str(text) for text in record["notes"]),
         warnings=tuple(str(text) for text in record["warnings"]),
     )
@@ -346,25 +360,6 @@ def _term_from_dict(record: Mapping[str, Any], joint: str, robot: Robot) -> Spri
     where = f"springs.{joint}.{effect.name}"
     values, stds = (_array(record[key], (count,), f"{where}.{key}") for key in ("values", "stds"))
     return SpringTerm(effect, tuple(values.tolist()), tuple(stds.tolist()), record.get("by_rest") is True)
-
-
-def _update_to_dict(update: Update) -> dict[str, Any]:
-    return {
-        "recording": update.recording,
-        "statistic": update.statistic,
-        "p_value": update.p_value,
-        "changed": list(update.changed),
-        "changes": [asdict(change) for change in update.changes],
-    }
-
-
-def _update_from_dict(record: Mapping[str, Any]) -> Update:
-    return Update(
-        recording=str(record["recording"]),
-        changes=tuple(Change(**change) for change in record["changes"]),
-        statistic=float(record["statistic"]),
-        p_value=float(record["p_value"]),
-    )
 
 
 def _excerpt_to_dict(excerpt: Excerpt) -> dict[str, Any]:

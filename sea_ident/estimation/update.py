@@ -1,6 +1,8 @@
 """An earlier model brought up to date: what has not changed need not be found again."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -62,6 +64,20 @@ class Update:
             mark = "changed" if change.changed else "kept"
             lines.append(f"  {change.name}: {change.before:.6g} -> {change.now:.6g} (z = {change.z:+.1f}), {mark}")
         return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can hold."""
+        return {**asdict(self), "changed": list(self.changed)}
+
+    @classmethod
+    def from_dict(cls, record: Mapping[str, Any]) -> "Update":
+        """What `to_dict` wrote."""
+        return cls(
+            recording=str(record["recording"]),
+            changes=tuple(Change(**change) for change in record["changes"]),
+            statistic=float(record["statistic"]),
+            p_value=float(record["p_value"]),
+        )
 
 
 def updated(new: Model, prior: Model) -> Model:

@@ -74,7 +74,8 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
     notes = ["what the data leave free has the physically consistent values nearest to those of the URDF"]
     if not physical.consistent:
         (notes if physical.within_uncertainty else warnings).append(physical.verdict())
-    inside = [column.name for effect in model.spring_effects for column in effect.columns(model.robot)]
+    beside = (*model.spring_effects, *(trend.effect for trend in model.trends))
+    inside = [column.name for effect in beside for column in effect.columns(model.robot)]
     # what errs in a sensor has amounts and no columns
     sensed = [effect.parameter_name() for effect in model.effects if isinstance(effect, SignalEffect)]
     return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside, *sensed)), notes, warnings

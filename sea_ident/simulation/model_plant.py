@@ -62,6 +62,9 @@ def plant_from_identified(model: Model) -> ModelPlant:
         for term in spring.terms:
             effects.append(term.effect)
             values.append(np.array(term.values))
+    for trend in model.trends:
+        effects.append(trend.effect)
+        values.append(np.array(trend.values))
     return plant_from_model(robot, effects, np.concatenate(values))
 
 

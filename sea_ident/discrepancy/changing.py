@@ -1,0 +1,62 @@
+"""What changes from period to period of one recording, for all that is asked about it."""
+
+from dataclasses import dataclass, replace
+
+from sea_ident._typing import FloatArray
+from sea_ident.discrepancy import check
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import PeriodData
+from sea_ident.discrepancy.findings import Gap
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.trend import TrendTest, compare_periods
+from sea_ident.discrepancy.trend_directions import Name
+from sea_ident.discrepancy.trend_gap import trend_gap
+from sea_ident.discrepancy.trend_terms import trend_terms
+from sea_ident.discrepancy.trend_within import within_periods
+from sea_ident.estimation import Model, TrendTerm
+from sea_ident.processing import ProcessedRecording
+from sea_ident.recordings import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Changing:
+    """What is known beforehand of what changes.
+
+    Attributes:
+        temperature: (P, n) mean temperature of every period [degC], None where it was not measured.
+        known: trends that the model has.
+    """
+
+    temperature: FloatArray | None
+    known: tuple[Name, ...] = ()
+
+    @classmethod
+    def of(cls, model: Model, recording: Recording | ProcessedRecording, data: PeriodData) -> "Changing":
+        """By a model and a recording."""
+        known = tuple((term.effect.name, term.effect.joint) for term in model.trends)
+        return cls(check.temperatures(recording, data), known)
+
+    def compared(self, bench: Bench, fit: Fit) -> TrendTest:
+        """The periods, compared with a model."""
+        return compare_periods(bench, fit, self.temperature, self.known)
+
+    def less(self, bench: Bench, fit: Fit, trends: TrendTest) -> Bench:
+        """The recording without what trends of a model do within a period."""
+        if not trends.trends:
+            return bench
+        known = within_periods(bench, fit, trends.trends, self.temperature)
+        return bench.comparing(replace(bench.data, known=known))
+
+    def terms(self, bench: Bench, fit: Fit, trends: TrendTest) -> tuple[TrendTerm, ...]:
+        """Trends as a model holds them."""
+        return trend_terms(bench, fit, trends.trends, self.temperature)
+
+    def gaps(self, bench: Bench, fit: Fit, trends: TrendTest, held: HeldOut | None) -> dict[str, Gap]:
+        """How far periods differ before and after it is known what changes, here and in another recording."""
+        found = {"training": trend_gap(bench, fit, trends.trends, self.temperature)}
+        if held is not None and held.recording is not None:
+            temperature = check.temperatures(held.recording, held.bench.data)
+            if not (temperature is None and self.temperature is not None):
+                found["holdout"] = trend_gap(held.bench, held.after, trends.trends, temperature)
+        return {label: gap for label, gap in found.items() if gap is not None}
