@@ -28,6 +28,7 @@ class Round:
         torque: on the recording [N m]; None where it was not compared.
         torque_held_out: on data that were held out [N m]; None without these.
         simulation: of forward simulation by signal [rad] or [N m]; empty where nothing was added.
+        course: of what changes from period to period [N m]; None where nothing does.
     """
 
     verdict: Verdict
@@ -35,10 +36,11 @@ class Round:
     torque: tuple[float, float] | None
     torque_held_out: tuple[float, float] | None
     simulation: Mapping[str, tuple[float, float] | None]
+    course: tuple[float, float] | None = None
 
     def summary(self) -> str:
         """One line."""
-        parts = {"torque": self.torque, "torque, held out": self.torque_held_out}
+        parts = {"torque": self.torque, "torque, held out": self.torque_held_out, "from period to period": self.course}
         parts |= {f"simulated {kind}": sizes for kind, sizes in self.simulation.items()}
         found = [f"{label} {sizes[0]:.3g} -> {sizes[1]:.3g}" for label, sizes in parts.items() if sizes is not None]
         return "gap: " + ("; ".join(found) if found else "not compared")
@@ -75,7 +77,7 @@ class ClosedGap:
     def added(self) -> tuple[tuple[str, str | None], ...]:
         """Effect and joint of everything that was added, in the order in which it was found.
 
-        What is named and no model holds (what drifts, what differs from a reference) is not among it.
+        What is named and no model holds (what differs from a reference) is not among it.
         """
         pairs = [
             (m.effect, m.joint) for d in self.rounds if d.verdict in NAMED for m in d.missing if _holds(d.model, m)
@@ -92,6 +94,7 @@ class ClosedGap:
                 torque=_sizes(d.training),
                 torque_held_out=_sizes(d.holdout),
                 simulation={kind: _sizes(gap) for kind, gap in d.simulation_gap.items()},
+                course=_sizes(d.trend_gap.get("training")),
             )
             for d in self.rounds
         )
@@ -128,9 +131,8 @@ def close_gap(
 ) -> ClosedGap:
     """Add the missing effects to a model, one diagnosis after the other.
 
-    Stops when a diagnosis names nothing (nothing is missing, not in the library, ambiguous, suspect), nothing that the
-    model does not hold already, or nothing that a model can hold (what drifts), where no repaired model can be
-    identified, and after `rounds`.
+    Stops when a diagnosis names nothing (nothing is missing, not in the library, ambiguous, suspect) or nothing that
+    the model does not hold already, where no repaired model can be identified, and after `rounds`.
 
     Args:
         model: the model.
@@ -178,9 +180,6 @@ def close_gap(
             break
         known |= found
         model = diagnosis.model
-        if not any(_holds(model, m) for m in diagnosis.missing):
-            notes.append(f"{names}: named, but a model of one moment has no place for what changes in the recording")
-            break
     else:
         notes.append(f"stopped after {rounds} diagnoses; the last one still named something")
     return ClosedGap(tuple(history), model, tuple(notes))

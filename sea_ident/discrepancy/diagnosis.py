@@ -24,6 +24,7 @@ from sea_ident.discrepancy.findings import (
     chance,
 )
 from sea_ident.effects import effect_from_dict
+from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation import Model
 from sea_ident.exceptions import ModelFileError
 
@@ -80,6 +81,11 @@ class Diagnosis:
     def adds(self) -> bool:
         """Whether anything is missing that was added to the model; what changed since an earlier one is in it."""
         return bool(self.missing) and self.verdict is not Verdict.ONLY_AGAINST_REFERENCE
+
+    @property
+    def adds_to_mean(self) -> bool:
+        """Whether any of it is in the mean of the periods, and does not just change in the course of the recording."""
+        return self.adds and any(not isinstance(m.detail, TrendEffect) for m in self.missing)
 
     def summary(self) -> str:
         """The paragraph, and the tables behind it."""

@@ -11,8 +11,7 @@ from sea_ident.discrepancy.data import spectrum
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import per_joint
-from sea_ident.discrepancy.linear import span
-from sea_ident.discrepancy.noise import ComplexArray
+from sea_ident.discrepancy.noise import ComplexArray, noise_directions
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.trend_directions import steady_rows
 from sea_ident.discrepancy.trend_within import changes
@@ -21,6 +20,9 @@ from sea_ident.effects.drift import TrendEffect
 FEWEST_TO_DIFFER = 4
 """Periods from which on their course is compared."""
 
+
+SAME = 0.03
+"""Share of the strongest direction of all courses below which another is none [-]."""
 
 SEEN = 3.0
 """Standard deviations of the power of noise by which what periods differ by must exceed it to count [-]."""
@@ -52,19 +54,25 @@ def trend_gap(bench: Bench, fit: Fit, trends: Sequence[Trend], temperature: Floa
         for p in range(data.periods):
             torque = data.rows(steady_rows(bench, fit, effect, p)) @ present
             explained[p] += spectrum((change[p] - change.mean())[:, None] * torque, data.harmonics)
-    basis = span(np.stack([course - course.mean() for course in courses], axis=1))
+    basis = _apart(np.stack([course - course.mean() for course in courses], axis=1))
     before, after = (
         np.stack([bench.cleaned(one) for one in parts - parts.mean(axis=0)])
         for parts in (residuals, residuals - explained)
     )
-    scatter = np.mean(np.abs(np.diff(after, axis=0)) ** 2, axis=0) / 2.0
-    noise = basis.shape[1] * scatter.sum(axis=0) / data.periods
+    steps = np.diff(after, axis=0) / np.sqrt(2.0)
+    noise = basis.shape[1] / data.periods * np.mean(np.sum(np.abs(steps) ** 2, axis=1), axis=0)
     had, left = (_along(basis, parts) - noise for parts in (before, after))
-    # of noise in few harmonics less is left over as many
-    directions = basis.shape[1] * scatter.sum(axis=0) ** 2 / np.maximum(np.sum(scatter**2, axis=0), 1e-300)
-    seen = np.maximum(had, left) > SEEN * noise / np.sqrt(np.maximum(directions, 1.0))
+    # what differs from pass to pass at a few reversals is in all harmonics at once
+    directions = [noise_directions(np.concatenate([each.real, each.imag], axis=1)) for each in np.moveaxis(steps, 2, 0)]
+    seen = np.maximum(had, left) > SEEN * noise * np.sqrt(2.0 / (basis.shape[1] * np.maximum(directions, 1.0)))
     had, left = (per_joint(bench, np.where(seen, np.maximum(power, 0.0), 0.0)) for power in (had, left))
     return Gap(had, left, per_joint(bench, noise), torque_units(bench.robot))
+
+
+def _apart(courses: FloatArray) -> FloatArray:
+    """(P, r) orthonormal basis of courses (P, k), one for all that are nearly the same: each has its share of noise."""
+    left, strength, _ = np.linalg.svd(courses / np.linalg.norm(courses, axis=0), full_matrices=False)
+    return np.asarray(left[:, strength > SAME * strength[0]], dtype=np.float64)
 
 
 def _along(basis: FloatArray, parts: ComplexArray) -> FloatArray:

@@ -13,6 +13,9 @@ from sea_ident.effects.state import Contribution, State
 
 _MINUTE = 60.0
 
+STRAIGHT = 300.0
+"""Times the time at which a drift is none from which on its time constant is none that anybody could see [-]."""
+
 
 class TrendEffect(Effect):
     """An effect that is a column times a change in time.
@@ -87,7 +90,9 @@ class DriftInTime(TrendEffect):
     @property
     def moment(self) -> str:
         """Where it is none, and how it goes on, for people."""
-        return f"{self.reference:.4g} s after a recording begins, with a time constant of {self.time_constant:.4g} s"
+        straight = self.time_constant > STRAIGHT * abs(self.reference)
+        on = "straight on" if straight else f"with a time constant of {self.time_constant:.4g} s"
+        return f"{self.reference:.4g} s after a recording begins, {on}"
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.changing import Changing
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import (
     _known_better,
@@ -192,11 +193,11 @@ def test_a_search_is_repeated_only_for_what_drifts_enough(rippled, monkeypatch, 
         calls.append(bench)
         return diagnosing._Found(bench, found, trends)
 
-    monkeypatch.setattr(diagnosing, "compare_periods", lambda *rest: drifting(None))
+    monkeypatch.setattr(Changing, "compared", lambda *rest: drifting(None))
+    monkeypatch.setattr(Changing, "less", lambda self, bench, *rest: bench)
     monkeypatch.setattr(diagnosing, "_searched_mean", searched)
-    monkeypatch.setattr(diagnosing, "_less", lambda bench, *rest: bench)
     monkeypatch.setattr(diagnosing, "searched_beside_reversals", lambda *both: both)
-    diagnosing._searched(bench, None, lambda what, share: None)
+    diagnosing._searched(bench, Changing(None), lambda what, share: None)
     assert len(calls) == searches
 
 

@@ -12,6 +12,7 @@ from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.untold import in_base
 from sea_ident.effects import base_effects, make_effect, spring_effects
+from sea_ident.effects.drift import warming
 from sea_ident.estimation import identify, physical_parameters, read_model
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import process
@@ -48,10 +49,10 @@ def recorded(laboratory, kind):
     return laboratory.record([(effect.effect, effect.values)], periods=12 if kind == "shape" else 8, seed=70)
 
 
-def diagnosed(model, recording):
+def diagnosed(model, recording, **options):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
-        return sea_ident.diagnose(model, recording)
+        return sea_ident.diagnose(model, recording, **options)
 
 
 def identified(leg, recording, **options):
@@ -101,12 +102,42 @@ def test_a_repaired_model_is_as_unsure_as_the_fit_that_it_comes_from(nothing_mis
             assert told > 0.6 * now.fit.std(names.index(f"{spring.joint}.{name}")), (spring.joint, name)
 
 
-def test_what_drifts_is_named_and_is_no_part_of_the_model(leg, series):
-    drift = planted("friction_drift", "knee", [0.3, 0.5], time_constant=60.0)
-    recording = simulate(leg, series[0], periods=12, seed=70, effects=[drift]).recording
-    found = diagnosed(identified(leg, recording), recording)
-    assert ("friction_drift", "knee") in [(m.effect, m.joint) for m in found.missing]
-    assert "friction_drift" not in [effect.name for effect in found.model.effects]
+@pytest.mark.parametrize("kind", ["friction_drift", pytest.param("torque_constant_drift", marks=pytest.mark.scenario)])
+def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, series, tmp_path, kind):
+    """Named, added, its gap gone here and on another motion, nothing left to name; true at the begin and at the end."""
+    values, shape = {"friction_drift": ([0.3, 3.0], {"time_constant": 60.0}), "torque_constant_drift": ([-0.3], {})}[
+        kind
+    ]
+    drift = planted(kind, "knee", values, **shape)
+    recording, other = (
+        simulate(leg, series[k], periods=periods, seed=80 + k, effects=[drift]).recording
+        for k, periods in ((0, 12), (1, 8))
+    )
+    found = diagnosed(identified(leg, recording), recording, holdout=other)
+    assert [(m.effect, m.joint) for m in found.missing] == [(kind, "knee")]
+    assert found.trend_gap["training"].shrink > 0.9
+    assert found.trend_gap["holdout"].shrink > 0.8
+    assert kind not in [effect.name for effect in found.model.effects]
+    (term,) = found.model.trends
+    assert (term.effect.name, term.effect.joint) == (kind, "knee")
+    found.model.save(tmp_path / "repaired.json")
+    again = diagnosed(read_model(tmp_path / "repaired.json"), recording)
+    assert (again.verdict, again.missing) == ("none", ())
+    np.testing.assert_allclose(again.model.trends[0].values, term.values, rtol=1e-3)
+    if kind == "friction_drift":
+        (mean,) = (p for p in found.model.parameters if p.name == "knee.coulomb_friction")
+        true = leg.joints[leg.index("knee")].actuator.coulomb_friction
+        for time in (0.0, 60.0):
+            change = term.effect.change(np.array(time), None)
+            std = np.hypot(mean.std, change * term.stds[1])
+            assert abs(mean.value + change * term.values[1] - true - 3.0 * warming(time, 60.0)) < 3.0 * std
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        closed = sea_ident.close_gap(identified(leg, recording), recording)
+    assert (closed.verdict, closed.added) == ("none", ((kind, "knee"),))
+    before, after = closed.history[0].course
+    assert after < 0.1 * before
+    assert "from period to period" in closed.history[0].summary()
 
 
 @pytest.mark.scenario

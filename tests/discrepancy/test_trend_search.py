@@ -211,3 +211,22 @@ def test_another_column_is_paid_for(used, rivals):
     own = replace(best, direction=friction, used=used, gain=best.gain + more)
     assert FORM * own.gain < EQUALLY_GOOD
     assert len(as_good(flat, trend(one, "hip", "torque_constant_drift"), MIDDLE, own, None)) == rivals
+
+
+def test_a_trend_that_the_model_has_keeps_its_place_and_another_is_looked_for_beside_it():
+    """What explains the same a little better is no other trend: the model has one for that."""
+    one, other, third = axes(3)
+    near = (one + 0.01 * third) / np.hypot(1.0, 0.01)
+    directions = [*trend(one, "hip"), *trend(near, "knee"), *trend(other, "ankle")]
+    flat = noisy(np.random.default_rng(7), np.outer(2.0 * MIDDLE, near), np.outer(0.5 * MIDDLE, other))
+
+    def names(known):
+        chosen = find_trends(flat, directions, MIDDLE, FLOOR, 3, 1e-3, lambda d, v: True, known)
+        return [c.direction.effect.joint for c in chosen]
+
+    assert names(()) == ["knee", "ankle"]
+    assert names([("stiffness_drift", "hip")]) == ["hip", "ankle"]
+    # one that is not there has no part in it
+    quiet = noisy(np.random.default_rng(8), np.outer(0.5 * MIDDLE, other))
+    chosen = find_trends(quiet, directions, MIDDLE, FLOOR, 3, 1e-3, lambda d, v: True, [("stiffness_drift", "hip")])
+    assert [c.direction.effect.joint for c in chosen] == ["ankle"]

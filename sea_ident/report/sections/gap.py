@@ -9,6 +9,8 @@ from sea_ident.report.bars import bars, bars_legend
 from sea_ident.report.chart import Band, Chart, Line
 from sea_ident.report.section import DiagnosisSection
 
+DATA = {"training": "the recording that was diagnosed", "holdout": "data that were held out"}
+IN_COURSE = "What is named changes in the course of the recording, and the mean of its periods hides it."
 ROLES = ("before", "after", "noise")
 POSITIONS = ("q", "theta")
 NAMES = ("as it was", "with the effects", "noise")
@@ -24,13 +26,18 @@ class GapSection(DiagnosisSection):
     def of_diagnosis(self, diagnosis: Diagnosis) -> dict[str, Any] | None:
         """Bars of every gap that was measured, and waveforms."""
         groups = []
-        for label, gap in (
-            ("the recording that was diagnosed", diagnosis.training),
-            ("data that were held out", diagnosis.holdout),
-        ):
+        for label, words in DATA.items():
+            gap = diagnosis.training if label == "training" else diagnosis.holdout
             if gap is not None:
                 units = units_by_joint(diagnosis.units, gap.before)
-                groups.append((_bars(gap, f"On {label}", units), _closed(gap, diagnosis.adds)))
+                closed = _closed(gap, diagnosis.adds) if diagnosis.adds_to_mean or not diagnosis.adds else IN_COURSE
+                groups.append((_bars(gap, f"On {words}", units), closed))
+        for label, gap in diagnosis.trend_gap.items():
+            units = units_by_joint(diagnosis.units, gap.before)
+            # the time in another recording is not that in this one
+            began = "" if label == "training" else ", as if they began at the same time"
+            title = f"From period to period, on {DATA[label]}{began}"
+            groups.append((_bars(gap, title, units), _closed(gap, True)))
         for signal, gap in diagnosis.simulation_gap.items():
             units, scale = units_by_joint(diagnosis.units, gap.before, positions=signal in POSITIONS), 1.0
             if signal in POSITIONS:

@@ -96,6 +96,7 @@ def simulate_mujoco(
     rate: float = 200.0,
     seed: int = 0,
     step: float = STEP,
+    course: float | None = None,
 ) -> Exact:
     """Simulate a robot that tracks a trajectory with motor feedback.
 
@@ -110,6 +111,7 @@ def simulate_mujoco(
         rate: of the recording [Hz].
         seed: of noise and jitter.
         step: time step [s].
+        course: time in which what drifts comes to its end [s]; that of the recording by default.
 
     Returns:
         The exact states and torques of the recorded periods.
@@ -164,7 +166,7 @@ def simulate_mujoco(
     hooks = [forms.Hooks() for _ in range(n)]
     wide: list[forms.Wide] = []
     for p in planted:
-        forms.bind(p, truth, hooks, wide, step, duration)
+        forms.bind(p, truth, hooks, wide, step, duration if course is None else course)
     pushes = _pushes(planted, model, series.period, duration)
     link_inertia = _link_inertias(model, data, series, iq)
 

@@ -76,7 +76,7 @@ def bind(planted: Planted, truth: Truth, hooks: list[Hooks], wide: list[Wide], s
         hooks: (n,) hooks of every joint.
         wide: laws over several joints.
         step: time step [s].
-        duration: length of the recording after settling, for drifts [s].
+        duration: time in which what drifts comes to its end, from when the robot has settled [s].
 
     Raises:
         KeyError: for a form that is not known.

@@ -80,6 +80,7 @@ def _recording(
         actuator_noise=case.noise.actuator * rms,
         settle=settling(case.robot),
         seed=seed,
+        course=case.periods * case.period,
     )
     return record(exact, truth, planted, case.noise, case.channel, rng, name)
 

@@ -52,7 +52,7 @@ def planted_effects(
         truth: the base model.
         smoothing: of the friction [rad/s].
         period: [s].
-        periods: of the recording.
+        periods: over which it drifts or pushes.
 
     Raises:
         KeyError: for an effect that the library does not have.
@@ -158,7 +158,9 @@ def record_project(
     """
     noise, robot = case.noise, truth.robot
     plant = plant_of(truth)
-    effects = [e for p in planted for e in planted_effects(p, truth, case.friction_smoothing, case.period, periods)]
+    # what drifts does so by the clock, however long a recording is
+    shape = case.friction_smoothing, case.period, max(case.periods, periods)
+    effects = [e for p in planted for e in planted_effects(p, truth, *shape)]
     share = noise.torque * _torque_rms(truth, series)
     scale = np.array([j.actuator.gear_ratio if j.actuator else 1.0 for j in robot.joints]) * np.nan_to_num(
         plant.torque_constant, nan=1.0

@@ -1,0 +1,51 @@
+"""Effects that change in the course of a recording: when they are none, and what they add by then."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sea_ident.effects import effect_from_dict, make_effect
+from sea_ident.effects.drift import TrendEffect, warming
+
+TIME = np.linspace(0.0, 300.0, 7)
+IN_TIME = ("friction_drift", "stiffness_drift", "torque_constant_drift")
+
+
+def test_warming_begins_with_one_per_minute_and_ends_with_its_time_constant():
+    assert warming(np.array(1e-3), 50.0) == pytest.approx(1e-3 / 60.0, rel=1e-4)
+    assert warming(np.array(1e6), 50.0) == pytest.approx(50.0 / 60.0)
+    np.testing.assert_allclose(warming(TIME, 1e9), TIME / 60.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", IN_TIME)
+@pytest.mark.parametrize("constant", [40.0, 1e4])
+def test_a_drift_is_counted_from_the_moment_at_which_it_is_none(name, constant):
+    plain = make_effect(name, "knee", time_constant=constant)
+    np.testing.assert_array_equal(plain.change(TIME, None), warming(TIME, constant))
+    level = float(np.mean(plain.change(TIME, None)))
+    about = plain.about(level)
+    assert about.change(np.array(about.reference), None) == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(about.change(TIME, None), plain.change(TIME, None) - level, atol=1e-12)
+    # once more, from there
+    again = about.about(0.1)
+    np.testing.assert_allclose(again.change(TIME, None), plain.change(TIME, None) - level - 0.1, atol=1e-12)
+    # and back
+    assert again.about(-level - 0.1).reference == pytest.approx(0.0, abs=1e-8)
+    assert effect_from_dict(about.to_dict()) == about
+
+
+def test_a_temperature_is_counted_from_another_one_which_a_simulation_then_has_throughout():
+    plain = make_effect("temperature_friction", "knee", reference=20.0, rise=10.0)
+    about = plain.about(7.5)
+    temperature = np.linspace(15.0, 40.0, 6)
+    np.testing.assert_allclose(about.change(TIME[:6], temperature), plain.change(TIME[:6], temperature) - 7.5)
+    np.testing.assert_array_equal(about.temperature(TIME), 27.5)
+    assert about.moment == "at 27.5 degC"
+
+
+def test_the_moment_is_said_and_a_time_constant_where_there_is_one():
+    drift = make_effect("friction_drift", "knee", time_constant=40.0, reference=12.5)
+    assert drift.moment == "12.5 s after a recording begins, with a time constant of 40 s"
+    assert replace(drift, time_constant=1e5).moment == "12.5 s after a recording begins, straight on"
+    assert TrendEffect.moment.fget(drift) == "in the mean of a recording"
