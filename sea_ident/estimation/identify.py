@@ -29,7 +29,7 @@ from sea_ident.estimation.spring_result import Verdict
 from sea_ident.estimation.spring_zero import other_zeros
 from sea_ident.estimation.springs import springs_from
 from sea_ident.estimation.uncertainty import Uncertainty, honest_uncertainty
-from sea_ident.estimation.update import updated
+from sea_ident.estimation.update import left_behind, updated
 from sea_ident.exceptions import IdentificationError, SeaIdentWarning
 from sea_ident.motion import Motion
 from sea_ident.one_thread import one_thread
@@ -167,9 +167,10 @@ def identify_observed(
         springs = springs_from(observations, model.values, known, unknown_zero, in_springs)
         springs = steps.widened_springs(springs, model.values, known, unknown_zero, in_springs)
     model = replace(model, springs=springs)
+    notes = (*processed.notes, *estimate.notes, *(() if prior is None else left_behind(prior)))
     found.extend([*_doubts(model), *other_zeros(observations, model.values, springs)])
     found.extend(described_friction(robot, chosen, springs))
-    return _told(model, found, (*processed.notes, *estimate.notes)), observations, tuple(found[first:])
+    return _told(model, found, notes), observations, tuple(found[first:])
 
 
 def _told(model: Model, found: Sequence[str], notes: tuple[str, ...]) -> Model:

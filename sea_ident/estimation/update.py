@@ -171,3 +171,13 @@ def _combine(
     values = new + gain @ (old[kept] - new[kept])
     combined = covariance - gain @ covariance[kept]
     return values, 0.5 * (combined + combined.T)
+
+
+def left_behind(prior: Model) -> tuple[str, ...]:
+    """What of an earlier model no mean of a recording tells, in words."""
+    if not prior.trends:
+        return ()
+    titles = ", ".join(trend.effect.title for trend in prior.trends)
+    return (
+        f"{titles} of the earlier model changes in the course of a recording: not in this model; diagnose finds it",
+    )

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.effects import base_effects, make_effect
-from sea_ident.estimation import identify, read_model
+from sea_ident.effects.friction_drift import FrictionDrift
+from sea_ident.estimation import TrendTerm, identify, read_model
 from sea_ident.exceptions import IdentificationError
 
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
@@ -57,3 +60,13 @@ def test_models_with_other_parameters_are_refused(leg, coarse, campaign):
     effects = (*base_effects(leg), make_effect("torque_offset", "hip"))
     with pytest.raises(IdentificationError, match="same robot and effects"):
         identify(leg, record(leg, coarse, 4, **NOISE), period=10.0, prior=campaign, effects=effects)
+
+
+def test_what_drifts_in_an_earlier_model_is_not_taken_over_and_that_is_said(leg, coarse, campaign):
+    term = TrendTerm(FrictionDrift("knee", reference=20.0), (0.0, 0.1), (0.0, 0.01))
+    told = "friction_drift at knee of the earlier model changes in the course of a recording"
+    recording = record(leg, coarse, 4, **NOISE)
+    model = identify(leg, recording, period=10.0, prior=replace(campaign, trends=(term,)))
+    assert model.trends == ()
+    assert [text for text in model.notes if told in text]
+    assert not [text for text in identify(leg, recording, period=10.0, prior=campaign).notes if told in text]

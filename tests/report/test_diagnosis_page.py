@@ -23,6 +23,8 @@ from sea_ident.discrepancy.findings import (
     Waveforms,
 )
 from sea_ident.effects import make_effect
+from sea_ident.effects.friction_drift import FrictionDrift
+from sea_ident.estimation import TrendTerm
 from sea_ident.report import write_report
 from sea_ident.report.bars import bars
 from sea_ident.report.chart import Band, Line
@@ -148,6 +150,36 @@ def test_the_page_says_what_would_make_an_amount_known_less(diagnosis, tmp_path)
         "knee.stribeck_friction 0.6 +- 0.3 N m."
     )
     assert told in words(page_of(diagnosis, tmp_path))
+
+
+def test_what_drifts_has_a_gap_from_period_to_period_and_none_in_the_mean(diagnosis, leg_model, tmp_path):
+    drift = FrictionDrift("knee", reference=40.0)
+    found = replace(diagnosis.missing[0], effect=drift.name, joint="knee", detail=drift, alternatives=())
+    gaps = {
+        "training": Gap({"hip": 0.0, "knee": 0.5}, {"hip": 0.0, "knee": 0.05}, {"hip": 0.02, "knee": 0.03}),
+        "holdout": Gap({"hip": 0.0, "knee": 0.4}, {"hip": 0.0, "knee": 0.1}, {"hip": 0.02, "knee": 0.03}),
+    }
+    term = TrendTerm(drift, (0.0, -0.2), (0.1, 0.01))
+    model = replace(leg_model, trends=(term,))
+    drifts = replace(diagnosis, missing=(found,), trend_gap=gaps, model=model)
+    assert not drifts.adds_to_mean
+    text = words(page_of(drifts, tmp_path))
+    assert "What is named changes in the course of the recording, and the mean of its periods hides it." in text
+    assert "90 % of what changes from period to period explained" in text
+    assert "From period to period, on data that were held out, as if they began at the same time" in text
+    assert "75 % of the gap is closed." in text
+    assert term.summary(model.robot) in text
+    assert "% of the gap closed on the recording" not in text
+    told = (
+        "from period to period, held out: hip within the noise (noise 0.02), knee 0.4 -> 0.1 (noise 0.03); shrink 0.75"
+    )
+    assert told in drifts.summary()
+    drifts.save(tmp_path / "found.json")
+    assert read_diagnosis(tmp_path / "found.json").trend_gap["holdout"].shrink == pytest.approx(0.75)
+    # beside what is in the mean both are told
+    both = replace(drifts, missing=(found, diagnosis.missing[0]))
+    assert both.adds_to_mean
+    assert "% of the gap closed on the recording" in words(page_of(both, tmp_path))
 
 
 def test_what_was_held_has_no_standard_deviation(diagnosis, tmp_path):

@@ -113,7 +113,7 @@ def _sum(terms: Mapping[str, float]) -> str:
 
 
 class Parameters(ModelSection):
-    """Table of the base parameters with intervals."""
+    """Table of the base parameters with intervals, and what changes beside them."""
 
     key: ClassVar[str] = "parameters"
     title: ClassVar[str] = "Parameters"
@@ -121,4 +121,5 @@ class Parameters(ModelSection):
 
     def of_model(self, model: Model, content: Content) -> dict[str, Any] | None:
         """The rows, and how sure they are."""
-        return {"rows": parameter_rows(model), "kind": str(model.covariance_kind)}
+        trends = [trend.summary(model.robot) for trend in model.trends]
+        return {"rows": parameter_rows(model), "kind": str(model.covariance_kind), "trends": trends}
