@@ -161,6 +161,7 @@ def diagnose(
     said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *held_notes, *change_notes, *repaired.notes)
     notes = replace(notes, warnings=said, limited=limited)
     tell("writing it down", 0.95)
+    held = changing.followed(bench, selection.final.fit, trends, held)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
         repaired = repaired.changing(changing.terms(bench, selection.final.fit, trends))

@@ -26,9 +26,12 @@ class TrendEffect(Effect):
     Attributes:
         mean_is_free: whether the model has parameters of its own that take up its mean over a recording, as friction
             and stiffness are; else those of others do.
+        follows: kind of the measured signal that it goes with; None where it goes by the time since a recording began,
+            which says nothing of what was before.
     """
 
     mean_is_free: ClassVar[bool] = True
+    follows: ClassVar[str | None] = None
 
     @abstractmethod
     def steady(self, state: State) -> Contribution:

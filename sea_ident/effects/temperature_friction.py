@@ -33,6 +33,7 @@ class TemperatureFriction(JointEffect, TrendEffect):
     smoothing: float = 0.01
 
     name: ClassVar[str] = "temperature_friction"
+    follows: ClassVar[str | None] = "temperature"
     side: ClassVar[Side] = Side.MOTOR
     source: ClassVar[str] = "Bittencourt, Gunnarsson, Static friction in a robot joint, ASME J. Dyn. Sys. 134, 2012"
 

@@ -1,0 +1,81 @@
+"""What changes, followed to data that were held out."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.changing import Changing
+from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.effects import make_effect
+from sea_ident.estimation import TrendTerm
+from sea_ident.recordings import Recording
+
+WARM = make_effect("temperature_friction", "knee", reference=20.0, rise=30.0, time_constant=50.0)
+PER_KELVIN = 0.1
+
+
+def trend(effect, *values):
+    numbers = np.array(values)
+    return TrendTest(1e-9, (Trend(effect, numbers, 0.01 * np.abs(numbers), 100.0, 1e-9, 0.02),), False)
+
+
+@pytest.fixture(scope="module")
+def warmed(laboratory):
+    """A leg whose knee warms up while it is recorded, and another motion of it that begins as cold and is shorter."""
+    planted = [(WARM, [0.0, PER_KELVIN])]
+    recordings = laboratory.record(planted, periods=16), laboratory.record(planted, periods=6, motion=1, seed=8)
+    benches = [laboratory.bench(recording) for recording in recordings]
+    fits = [settle(bench, bench.effects) for bench in benches]
+    start, other = fits[0], benches[1]
+    found = other.predicted(start.fit.effects, start.fit.parameters)
+    selection = Selection(start, start, 0, ())
+    held = HeldOut(other, found, found, other.noise(found), fits[1], (), "other", recording=recordings[1])
+    return recordings, benches, selection, held
+
+
+def gap(held):
+    return gap_of(held.bench, held.before, held.after, held.noise)
+
+
+def test_friction_of_another_temperature_is_predicted_on_data_that_were_held_out(warmed):
+    recordings, benches, selection, held = warmed
+    changing = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data)
+    here, there = (np.mean(r.channel("temperature", ["knee"])) for r in recordings)
+    assert here - there > 3.0
+    alone = gap(held)
+    assert alone.after["knee"] == pytest.approx(PER_KELVIN * (here - there), rel=0.15)
+    trends = trend(replace(WARM, smoothing=0.01), 0.0, PER_KELVIN)
+    followed = gap(changing.followed(benches[0], selection.final.fit, trends, held))
+    assert followed.before == alone.before
+    assert followed.after["knee"] < 0.15 * alone.after["knee"]
+    assert set(changing.gaps(benches[0], selection.final.fit, trends, held)) == {"training", "holdout"}
+
+
+def test_without_its_temperature_there_and_by_time_nothing_is_predicted(warmed):
+    recordings, benches, selection, held = warmed
+    changing = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data)
+    trends = trend(WARM, 0.0, PER_KELVIN)
+    columns = {name: values for name, values in recordings[1].columns.items() if name != "temperature_knee"}
+    cold = replace(held, recording=Recording(time=recordings[1].time, columns=columns))
+    assert gap(changing.followed(benches[0], selection.final.fit, trends, cold)).after == gap(held).after
+    assert set(changing.gaps(benches[0], selection.final.fit, trends, cold)) == {"training"}
+    by_time = trend(make_effect("friction_drift", "knee"), 0.0, 1.0)
+    assert gap(changing.followed(benches[0], selection.final.fit, by_time, held)).after == gap(held).after
+    assert changing.followed(benches[0], selection.final.fit, trends, None) is None
+
+
+def test_what_a_model_holds_is_looked_for_first(warmed):
+    recordings, benches, selection, _ = warmed
+    held = SimpleNamespace(trends=(TrendTerm(make_effect("friction_drift", "knee"), (0.0, 0.1), (0.0, 0.0)),))
+    names = []
+    for model in (SimpleNamespace(trends=()), held):
+        changing = Changing.of(model, recordings[0], benches[0].data)
+        found = changing.compared(benches[0], selection.final.fit)
+        names.append([(trend.effect.name, trend.in_model) for trend in found.trends])
+    assert names == [[("temperature_friction", False)], [("friction_drift", True)]]
