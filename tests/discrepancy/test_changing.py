@@ -62,7 +62,7 @@ def test_without_its_temperature_there_and_by_time_nothing_is_predicted(warmed):
     changing = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data)
     trends = trend(WARM, 0.0, PER_KELVIN)
     columns = {name: values for name, values in recordings[1].columns.items() if name != "temperature_knee"}
-    cold = replace(held, recording=Recording(time=recordings[1].time, columns=columns))
+    cold = replace(held, recording=Recording(time=recordings[1].time, columns=columns, source="other"))
     assert gap(changing.followed(benches[0], selection.final.fit, trends, cold)).after == gap(held).after
     assert set(changing.gaps(benches[0], selection.final.fit, trends, cold)) == {"training"}
     by_time = trend(make_effect("friction_drift", "knee"), 0.0, 1.0)
