@@ -19,6 +19,12 @@ BENDS = 0.2
 """Standard deviation of a shape, of its logarithm or as a share of its range, from which on what the other values are
 along it is no straight line any more [-]."""
 
+OTHERWISE = float(np.log(2.0))
+"""Logarithm of the factors between the speeds at which halves of a friction may turn that turns as no library knows."""
+
+OTHERWISE = float(np.log(2.0))
+"""Logarithm of the factors between the speeds at which halves of a friction may turn that turns as no library knows."""
+
 MOST_DOUBLINGS = 4
 """How often the way along such a shape is made twice as long while the fit stays as good."""
 
@@ -51,7 +57,41 @@ def uncertainties(bench: Bench, now: Settled) -> FloatArray:
         for way, other in _as_good(bench, now, k - count, told[k], unit * (stds[k] / plain[k]) ** 2):
             told[:count] = np.maximum(told[:count], np.abs(other.values - fit.values))
             told[k] = max(told[k], way)
-    return told
+    return np.asarray(np.hypot(told, turned_otherwise(bench, now)), dtype=np.float64)
+
+
+def turned_otherwise(bench: Bench, now: Settled) -> FloatArray:
+    """(p + s,) standard deviations of parameters and shapes by how friction turns, which no library knows.
+
+    As a hyperbolic tangent it is held to be, but it may as well do so with a sharper core and longer tails, or the
+    other way round: half of it twice as fast and half of it twice as slowly. How much of that there is, is a parameter
+    more, about zero with a standard deviation of one, and known better where the recording tells.
+
+    Args:
+        bench: the recording.
+        now: the model.
+    """
+    fit = now.fit
+    power = np.zeros(len(fit.columns) + len(fit.free_shapes))
+    begins = np.cumsum([0, *bench.counts(fit.effects)])
+    for position, effect in enumerate(fit.effects):
+        for shape in effect.shapes:
+            if shape.name != "smoothing":
+                continue
+            change = np.zeros(fit.residual.shape, dtype=np.complex128)
+            for step in (-OTHERWISE, OTHERWISE):
+                moved = moved_within(fit.effects, position, shape, step)
+                for k, (one, other) in enumerate(zip(fit.effects, moved, strict=True)):
+                    if one is not other:
+                        spectra = bench.column_spectra(other, moved) - bench.column_spectra(one, fit.effects)
+                        change += 0.5 * spectra @ fit.values[begins[k] : begins[k + 1]]
+            flat = bench.whitening(now.noise).flat(change * fit.scale)
+            along = fit.basis.T @ flat
+            beyond = flat - fit.basis @ along
+            weight = fit.unit + float(beyond @ beyond)
+            amount = float(beyond @ fit.whitened) / weight
+            power += (fit.step_factor @ along) ** 2 * (amount**2 + fit.unit / weight)
+    return np.sqrt(power)
 
 
 def _as_good(bench: Bench, now: Settled, number: int, step: float, rise: float) -> Iterator[tuple[float, Fit]]:
