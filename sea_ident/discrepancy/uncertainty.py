@@ -1,6 +1,7 @@
 """Standard deviations of what a diagnosis tells of an effect."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,8 +10,11 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.free_shapes import distance, moved_within
 from sea_ident.discrepancy.judge import flat_steps
+from sea_ident.discrepancy.noise import ComplexArray
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.effects import Effect
+from sea_ident.effects.external_force import WHEN, ExternalForce
 
 FEWEST_STEPS = 5
 """Steps between periods from which on their own scatter says something."""
@@ -57,15 +61,16 @@ def uncertainties(bench: Bench, now: Settled) -> FloatArray:
         for way, other in _as_good(bench, now, k - count, told[k], unit * (stds[k] / plain[k]) ** 2):
             told[:count] = np.maximum(told[:count], np.abs(other.values - fit.values))
             told[k] = max(told[k], way)
-    return np.asarray(np.hypot(told, turned_otherwise(bench, now)), dtype=np.float64)
+    return np.asarray(np.hypot(told, by_what_is_held(bench, now)), dtype=np.float64)
 
 
-def turned_otherwise(bench: Bench, now: Settled) -> FloatArray:
-    """(p + s,) standard deviations of parameters and shapes by how friction turns, which no library knows.
+def by_what_is_held(bench: Bench, now: Settled) -> FloatArray:
+    """(p + s,) standard deviations of parameters and shapes by what no fit has for a parameter.
 
-    As a hyperbolic tangent it is held to be, but it may as well do so with a sharper core and longer tails, or the
-    other way round: half of it twice as fast and half of it twice as slowly. How much of that there is, is a parameter
-    more, about zero with a standard deviation of one, and known better where the recording tells.
+    How friction turns: as a hyperbolic tangent it is held to be, but it may as well do so with a sharper core and
+    longer tails, or the other way round, as half of it twice as fast and half of it twice as slowly does. And when a
+    push begins and ends, to a sample. How much of each there is, is one more parameter, about zero with a standard
+    deviation of one, and known better where the recording tells.
 
     Args:
         bench: the recording.
@@ -73,25 +78,45 @@ def turned_otherwise(bench: Bench, now: Settled) -> FloatArray:
     """
     fit = now.fit
     power = np.zeros(len(fit.columns) + len(fit.free_shapes))
-    begins = np.cumsum([0, *bench.counts(fit.effects)])
+    for change in (*_turned(bench, fit), *_pushed(bench, fit)):
+        flat = bench.whitening(now.noise).flat(change * fit.scale)
+        along = fit.basis.T @ flat
+        beyond = flat - fit.basis @ along
+        weight = fit.unit + float(beyond @ beyond)
+        amount = float(beyond @ fit.whitened) / weight
+        power += (fit.step_factor @ along) ** 2 * (amount**2 + fit.unit / weight)
+    return np.sqrt(power)
+
+
+def _turned(bench: Bench, fit: Fit) -> Iterator[ComplexArray]:
+    """(H + 1, E) change of the torque by every friction that turns otherwise, with what turns as it does."""
     for position, effect in enumerate(fit.effects):
         for shape in effect.shapes:
-            if shape.name != "smoothing":
-                continue
-            change = np.zeros(fit.residual.shape, dtype=np.complex128)
-            for step in (-OTHERWISE, OTHERWISE):
-                moved = moved_within(fit.effects, position, shape, step)
-                for k, (one, other) in enumerate(zip(fit.effects, moved, strict=True)):
-                    if one is not other:
-                        spectra = bench.column_spectra(other, moved) - bench.column_spectra(one, fit.effects)
-                        change += 0.5 * spectra @ fit.values[begins[k] : begins[k + 1]]
-            flat = bench.whitening(now.noise).flat(change * fit.scale)
-            along = fit.basis.T @ flat
-            beyond = flat - fit.basis @ along
-            weight = fit.unit + float(beyond @ beyond)
-            amount = float(beyond @ fit.whitened) / weight
-            power += (fit.step_factor @ along) ** 2 * (amount**2 + fit.unit / weight)
-    return np.sqrt(power)
+            if shape.name == "smoothing":
+                ways = (moved_within(fit.effects, position, shape, step) for step in (-OTHERWISE, OTHERWISE))
+                yield sum((0.5 * _change(bench, fit, way) for way in ways), np.zeros_like(fit.residual))
+
+
+def _pushed(bench: Bench, fit: Fit) -> Iterator[ComplexArray]:
+    """(H + 1, E) change of the torque by every push that begins or ends a sample later."""
+    sample = bench.data.period / bench.data.samples
+    for position, effect in enumerate(fit.effects):
+        if not isinstance(effect, ExternalForce):
+            continue
+        for name in WHEN:
+            moved = [replace(effect, **{name: getattr(effect, name) + step * sample}) for step in (-0.5, 0.5)]
+            ways = [[push if k == position else e for k, e in enumerate(fit.effects)] for push in moved]
+            yield _change(bench, fit, ways[1]) - _change(bench, fit, ways[0])
+
+
+def _change(bench: Bench, fit: Fit, effects: Sequence[Effect]) -> ComplexArray:
+    """(H + 1, E) change of the torque of a fit with other shapes of its effects, none in the chain of signals."""
+    begins, change = np.cumsum([0, *bench.counts(fit.effects)]), np.zeros_like(fit.residual)
+    for k, (one, other) in enumerate(zip(fit.effects, effects, strict=True)):
+        if one is not other:
+            spectra = bench.column_spectra(other, effects) - bench.column_spectra(one, fit.effects)
+            change += spectra @ fit.values[begins[k] : begins[k + 1]]
+    return change
 
 
 def _as_good(bench: Bench, now: Settled, number: int, step: float, rise: float) -> Iterator[tuple[float, Fit]]:

@@ -1,6 +1,7 @@
 """Standard deviations that a diagnosis tells are those of estimates from one recording to the next."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import sea_ident.discrepancy.uncertainty as module
 from sea_ident.discrepancy.named import named_effect
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import make_effect
 from sea_ident.estimation import identify
@@ -77,6 +78,7 @@ def test_periods_that_scatter_along_a_parameter_make_it_less_sure(nothing_missin
     one = [c.name for c in fit.columns].index("knee.coulomb_friction")
     along = fit.basis @ factor[one] / noise[one]
     monkeypatch.setattr(module, "flat_steps", lambda *given: 3.0 * np.outer([1.0, -1.0] * 5, along))
+    monkeypatch.setattr(module, "by_what_is_held", lambda *given: 0.0)
     told = uncertainties(bench, now)
     assert told[one] == pytest.approx(3.0 * noise[one] * fit.unit**0.5)
     assert np.all(told >= noise * fit.unit**0.5 * (1.0 - 1e-12))
@@ -93,6 +95,7 @@ def test_what_a_model_leaves_makes_it_less_sure(rippled, monkeypatch):
     """A hip that cogs, told as a constant torque."""
     bench, start, _ = rippled
     monkeypatch.setattr(module, "flat_steps", lambda *given: np.zeros((0, 0)))
+    monkeypatch.setattr(module, "by_what_is_held", lambda *given: 0.0)
     fit = bench.fit((*start.fit.effects, make_effect("torque_offset", "hip")), start.noise)
     ratio = fit.statistic / fit.dof
     assert ratio > 2.0
@@ -124,3 +127,45 @@ def test_along_a_shape_that_is_hardly_known_values_are_as_unsure_as_they_go(labo
     monkeypatch.setattr(module, "BENDS", np.inf)
     np.testing.assert_array_equal(possible, uncertainties(bench, now))
     assert now.fit.statistic < 1.2 * now.fit.dof
+
+
+def test_friction_that_turns_in_another_form_is_told_as_unsure_as_it_is_off(laboratory):
+    """Half of a friction of the link turns at a quarter of the speed of the other half: no single turn is right."""
+    speeds, values = (0.015, 0.06), np.array([0.4, 1.0])
+    planted = [(make_effect("link_friction", "knee", smoothing=speed), 0.5 * values) for speed in speeds]
+    quiet = {"jitter": FrictionJitter.none()}
+    twofold, single = (
+        laboratory.bench(laboratory.record(effects, periods=12, **quiet))
+        for effects in (planted, [(make_effect("link_friction", "knee", smoothing=0.03), values)])
+    )
+    off, told = [], []
+    for bench in (twofold, single):
+        start = settle(bench, bench.effects)
+        friction = make_effect("link_friction", "knee", smoothing=0.03)
+        fit = bench.refine((*start.fit.effects, friction), start.noise, start=start.fit.parameters)
+        now = settle_again(bench, fit)
+        at = [column.name for column in now.fit.columns].index("knee.link_friction_viscous")
+        off.append(now.fit.values[at : at + 2] - values)
+        told.append(
+            (np.linalg.norm(now.fit.covariance_factor[at : at + 2], axis=1), uncertainties(bench, now)[at : at + 2])
+        )
+    plain, whole = told[0]
+    assert np.all(np.abs(off[0]) > 4.0 * np.sqrt(2.0) * plain)
+    assert np.all(np.abs(off[0]) < 2.0 * whole)
+    # where it turns as the library has it, the recording says so
+    plain, whole = told[1]
+    assert np.all(np.abs(off[1]) < 3.0 * whole)
+    assert np.all(whole < 3.0 * plain)
+
+
+def test_a_push_whose_end_is_off_by_most_of_a_sample_is_told_as_unsure_as_it_is_off(laboratory):
+    push, force = make_effect("external_force", "knee", start=1.0, stop=1.1, period=PERIOD), np.array([40.0, 0.0, 0.0])
+    bench = laboratory.bench(laboratory.record([(push, force)], periods=12, jitter=FrictionJitter.none()))
+    start = settle(bench, bench.effects)
+    later = replace(push, stop=push.stop + 0.8 * bench.data.period / bench.data.samples)
+    fit = bench.fit((*start.fit.effects, later), start.noise, start=start.fit.parameters)
+    now = Settled(fit, start.noise)
+    at = [column.name for column in fit.columns].index("knee.external_force_x")
+    off = abs(fit.values[at] - force[0])
+    assert off > 4.0 * np.linalg.norm(fit.covariance_factor[at]) * fit.unit**0.5
+    assert off < 2.0 * uncertainties(bench, now)[at]
