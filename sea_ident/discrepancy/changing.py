@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import check
+from sea_ident.discrepancy import check, words
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, spectrum
 from sea_ident.discrepancy.findings import Gap
@@ -45,6 +45,10 @@ class Changing:
     def compared(self, bench: Bench, fit: Fit) -> TrendTest:
         """The periods, compared with a model."""
         return compare_periods(bench, fit, self.temperature, self.known)
+
+    def not_shown_by(self, trends: TrendTest) -> tuple[str, ...]:
+        """Trends of the model that a comparison of periods does not show, in words."""
+        return tuple(words.does_not_drift(*name) for name in self.known if name not in trends.names)
 
     def less(self, bench: Bench, fit: Fit, trends: TrendTest) -> Bench:
         """The recording without what trends of a model do within a period."""

@@ -14,6 +14,7 @@ from sea_ident.discrepancy.standing import Standing
 from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.effects.base import titled
 from sea_ident.exceptions import DivergenceError, SeaIdentError
 
 FEW_PERIODS = 10
@@ -138,6 +139,15 @@ def at_rest(joint: str) -> str:
     return (
         f"the spring of {joint!r} has a constant torque beside its dry friction, which may rest anywhere, depending on "
         "how it was loaded before: the repaired model has it as spring_offset, and it is no effect of its own"
+    )
+
+
+def does_not_drift(effect: str, joint: str | None) -> str:
+    """That what changes in the model does not do so in the recording."""
+    title = titled(effect, joint)
+    return (
+        f"{title} of the model does not show in this recording, and is not in the repaired model: what warms up does "
+        "so from a cold start, in many periods"
     )
 
 

@@ -78,4 +78,8 @@ def test_what_a_model_holds_is_looked_for_first(warmed):
         changing = Changing.of(model, recordings[0], benches[0].data)
         found = changing.compared(benches[0], selection.final.fit)
         names.append([(trend.effect.name, trend.in_model) for trend in found.trends])
+        assert changing.not_shown_by(found) == ()
     assert names == [[("temperature_friction", False)], [("friction_drift", True)]]
+    quiet = replace(found, trends=())
+    (told,) = changing.not_shown_by(quiet)
+    assert told.startswith("friction_drift at knee of the model does not show in this recording")

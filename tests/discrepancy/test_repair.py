@@ -124,6 +124,10 @@ def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, series, tmp_p
     again = diagnosed(read_model(tmp_path / "repaired.json"), recording)
     assert (again.verdict, again.missing) == ("none", ())
     np.testing.assert_allclose(again.model.trends[0].values, term.values, rtol=1e-3)
+    cold = simulate(leg, series[0], periods=6, seed=90).recording
+    steady = diagnosed(again.model, cold)
+    assert steady.model.trends == ()
+    assert f"{kind} at knee of the model does not show in this recording" in "; ".join(steady.warnings)
     if kind == "friction_drift":
         (mean,) = (p for p in found.model.parameters if p.name == "knee.coulomb_friction")
         true = leg.joints[leg.index("knee")].actuator.coulomb_friction

@@ -48,6 +48,14 @@ def test_half_a_drift_leaves_the_other_half(laboratory):
     assert trend_gap(bench, fit, [trend(-RATE)]).shrink == pytest.approx(-1.0, abs=0.06)
 
 
+def test_what_goes_straight_on_is_there_whatever_course_is_named(laboratory):
+    """One that is over within a period explains none of it, and has none of it along its own course."""
+    bench, fit = drifting(laboratory, 12)
+    straight, soon = (trend_gap(bench, fit, [trend(1e-9, **shape)]) for shape in ({}, {"time_constant": 1.0}))
+    assert soon.before["knee"] == pytest.approx(straight.before["knee"], rel=0.05)
+    assert soon.after["knee"] == pytest.approx(straight.before["knee"], rel=0.05)
+
+
 def test_noise_is_that_of_the_periods_and_of_every_course(laboratory):
     """Without a drift: as much of the scatter of one period as there are courses, over the root of their number."""
     bench = laboratory.bench(laboratory.record(periods=12))
@@ -66,6 +74,18 @@ def test_another_motion_that_begins_as_the_first_did_drifts_as_far(laboratory):
     gap = trend_gap(bench, fit, [trend(RATE)])
     assert gap.after["knee"] < gap.noise["knee"]
     assert gap.shrink > 0.9
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "rate"), [("torque_constant_drift", "knee", 0.6), ("stiffness_drift", "hip", -150.0)]
+)
+def test_columns_that_drift_themselves_are_those_of_every_period(laboratory, name, joint, rate):
+    bench = laboratory.bench(laboratory.record([(name, joint, [rate], {})], periods=12))
+    values = np.array([rate])
+    found = Trend(make_effect(name, joint), values, 0.01 * np.abs(values), 100.0, 1e-9, 0.02)
+    gap = trend_gap(bench, settle(bench, bench.effects).fit, [found])
+    assert gap.before[joint] > 10.0 * gap.noise[joint]
+    assert gap.after[joint] < gap.noise[joint]
 
 
 def test_without_trends_or_periods_there_is_no_course(laboratory):
