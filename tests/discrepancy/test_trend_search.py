@@ -230,3 +230,9 @@ def test_a_trend_that_the_model_has_keeps_its_place_and_another_is_looked_for_be
     quiet = noisy(np.random.default_rng(8), np.outer(0.5 * MIDDLE, other))
     chosen = find_trends(quiet, directions, MIDDLE, FLOOR, 3, 1e-3, lambda d, v: True, [("stiffness_drift", "hip")])
     assert [c.direction.effect.joint for c in chosen] == ["ankle"]
+    # nor where nothing is, nor is there room for more than the largest number
+    nothing = noisy(np.random.default_rng(9))
+    known = [("stiffness_drift", "hip")]
+    assert find_trends(nothing, directions, MIDDLE, FLOOR, 3, 1e-3, lambda d, v: True, known) == []
+    (only,) = find_trends(flat, directions, MIDDLE, FLOOR, 1, 1e-3, lambda d, v: True, known)
+    assert only.direction.effect.joint == "hip"
