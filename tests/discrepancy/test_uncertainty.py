@@ -158,6 +158,20 @@ def test_friction_that_turns_in_another_form_is_told_as_unsure_as_it_is_off(labo
     assert np.all(whole < 3.0 * plain)
 
 
+@pytest.mark.parametrize("name", ["knee.viscous_friction", "hip.spring_damping", "shank.mx"])
+def test_what_looks_like_a_column_is_that_parameter_and_no_more(nothing_missing, monkeypatch, name):
+    """Of what no recording tells from a parameter, that is as unsure as it is held to be."""
+    bench, now = nothing_missing
+    fit = now.fit
+    column = [each.name for each in fit.columns].index(name)
+    torque = 0.1 * bench.design(fit.effects)[:, :, column]
+    monkeypatch.setattr(module, "_turned", lambda *given: [torque])
+    shift = module.by_what_is_held(bench, now)
+    assert shift[column] == pytest.approx(0.1, rel=1e-5)
+    friction = [k for k, each in enumerate(fit.columns) if "friction" in each.name and k != column]
+    assert np.all(shift[friction] < 1e-6)
+
+
 def test_a_push_whose_end_is_off_by_most_of_a_sample_is_told_as_unsure_as_it_is_off(laboratory):
     push, force = make_effect("external_force", "knee", start=1.0, stop=1.1, period=PERIOD), np.array([40.0, 0.0, 0.0])
     bench = laboratory.bench(laboratory.record([(push, force)], periods=12, jitter=FrictionJitter.none()))

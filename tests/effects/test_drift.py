@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.effects import effect_from_dict, make_effect
+from sea_ident import load_robot
+from sea_ident.base_parameters import random_motion
+from sea_ident.effects import State, effect_from_dict, make_effect
 from sea_ident.effects.drift import TrendEffect, warming
 
 TIME = np.linspace(0.0, 300.0, 7)
@@ -49,3 +51,16 @@ def test_the_moment_is_said_and_a_time_constant_where_there_is_one():
     assert drift.moment == "12.5 s after a recording begins, with a time constant of 40 s"
     assert replace(drift, time_constant=1e5).moment == "12.5 s after a recording begins, straight on"
     assert TrendEffect.moment.fget(drift) == "in the mean of a recording"
+
+
+@pytest.mark.parametrize("name", IN_TIME)
+def test_its_columns_are_those_of_a_change_of_one_times_the_change(name):
+    """For what follows the load of the joint, too, where no torque was measured."""
+    leg = load_robot("exo_leg")
+    drift = make_effect(name, "knee", time_constant=40.0, reference=12.5)
+    state = State(leg, replace(random_motion(leg, 7, 2), time=TIME))
+    change = drift.change(TIME, None)[:, None, None]
+    whole, one = drift.evaluate(state), drift.steady(state)
+    assert np.any(one.motor)
+    np.testing.assert_allclose(whole.motor, one.motor * change, rtol=1e-12)
+    np.testing.assert_allclose(whole.link, one.link * change, rtol=1e-12)

@@ -154,3 +154,14 @@ def test_without_a_temperature_friction_is_that_of_its_reference(models):
     beyond = validate(whole, measured).predicted - alone.predicted
     each = [np.tanh(motion.dtheta[:, KNEE] / warm.effect.smoothing) for motion in processed.period_motions]
     np.testing.assert_allclose(beyond[:, KNEE], 0.2 * np.mean(each, axis=0), atol=1e-12)
+
+
+def test_a_spring_that_softens_is_no_torque_of_the_motor(models):
+    """It cancels in the sum of link and motor, and so it does in every prediction."""
+    mean, _, processed, _ = models
+    softer = TrendTerm(make_effect("stiffness_drift", "knee", reference=10.0), (-20.0,), (1.0,))
+    torque, variance = trend_torque(mean.robot, mean.effects, [softer], processed.motion)
+    assert not np.any(torque) and not np.any(variance)
+    np.testing.assert_array_equal(
+        replace(mean, trends=(softer,)).predict(processed.motion), mean.predict(processed.motion)
+    )
