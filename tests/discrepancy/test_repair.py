@@ -102,32 +102,33 @@ def test_a_repaired_model_is_as_unsure_as_the_fit_that_it_comes_from(nothing_mis
             assert told > 0.6 * now.fit.std(names.index(f"{spring.joint}.{name}")), (spring.joint, name)
 
 
-@pytest.mark.parametrize("kind", ["friction_drift", pytest.param("torque_constant_drift", marks=pytest.mark.scenario)])
-def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, series, tmp_path, kind):
-    """Named, added, its gap gone here and on another motion, nothing left to name; true at the begin and at the end."""
-    values, shape = {"friction_drift": ([0.3, 3.0], {"time_constant": 60.0}), "torque_constant_drift": ([-0.3], {})}[
-        kind
-    ]
-    drift = planted(kind, "knee", values, **shape)
+DRIFTS = {
+    "friction_drift": planted("friction_drift", "knee", [0.3, 3.0], time_constant=60.0),
+    "torque_constant_drift": planted("torque_constant_drift", "knee", [-0.3]),
+}
+
+
+@pytest.fixture(
+    scope="module", params=["friction_drift", pytest.param("torque_constant_drift", marks=pytest.mark.scenario)]
+)
+def drifted(request, leg, series):
+    """A drift, two motions with it, and the diagnosis of one by way of the other."""
     recording, other = (
-        simulate(leg, series[k], periods=periods, seed=80 + k, effects=[drift]).recording
+        simulate(leg, series[k], periods=periods, seed=80 + k, effects=[DRIFTS[request.param]]).recording
         for k, periods in ((0, 12), (1, 8))
     )
-    found = diagnosed(identified(leg, recording), recording, holdout=other)
+    return request.param, recording, diagnosed(identified(leg, recording), recording, holdout=other)
+
+
+def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, drifted):
+    """Named, added, its gap gone here and on another motion; and true at the begin and at the end."""
+    kind, _, found = drifted
     assert [(m.effect, m.joint) for m in found.missing] == [(kind, "knee")]
     assert found.trend_gap["training"].shrink > 0.9
     assert found.trend_gap["holdout"].shrink > 0.8
     assert kind not in [effect.name for effect in found.model.effects]
     (term,) = found.model.trends
     assert (term.effect.name, term.effect.joint) == (kind, "knee")
-    found.model.save(tmp_path / "repaired.json")
-    again = diagnosed(read_model(tmp_path / "repaired.json"), recording)
-    assert (again.verdict, again.missing) == ("none", ())
-    np.testing.assert_allclose(again.model.trends[0].values, term.values, rtol=1e-3)
-    cold = simulate(leg, series[0], periods=6, seed=90).recording
-    steady = diagnosed(again.model, cold)
-    assert steady.model.trends == ()
-    assert f"{kind} at knee of the model does not show in this recording" in "; ".join(steady.warnings)
     if kind == "friction_drift":
         (mean,) = (p for p in found.model.parameters if p.name == "knee.coulomb_friction")
         true = leg.joints[leg.index("knee")].actuator.coulomb_friction
@@ -135,6 +136,19 @@ def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, series, tmp_p
             change = term.effect.change(np.array(time), None)
             std = np.hypot(mean.std, change * term.stds[1])
             assert abs(mean.value + change * term.values[1] - true - 3.0 * warming(time, 60.0)) < 3.0 * std
+
+
+@pytest.mark.scenario
+def test_nothing_is_left_to_name_beside_what_drifts_in_the_model(leg, series, drifted, tmp_path):
+    kind, recording, found = drifted
+    found.model.save(tmp_path / "repaired.json")
+    again = diagnosed(read_model(tmp_path / "repaired.json"), recording)
+    assert (again.verdict, again.missing) == ("none", ())
+    np.testing.assert_allclose(again.model.trends[0].values, found.model.trends[0].values, rtol=1e-3)
+    cold = simulate(leg, series[0], periods=6, seed=90).recording
+    steady = diagnosed(again.model, cold)
+    assert steady.model.trends == ()
+    assert f"{kind} at knee of the model does not show in this recording" in "; ".join(steady.warnings)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         closed = sea_ident.close_gap(identified(leg, recording), recording)
