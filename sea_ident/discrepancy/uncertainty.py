@@ -26,9 +26,6 @@ along it is no straight line any more [-]."""
 OTHERWISE = float(np.log(2.0))
 """Logarithm of the factors between the speeds at which halves of a friction may turn that turns as no library knows."""
 
-OTHERWISE = float(np.log(2.0))
-"""Logarithm of the factors between the speeds at which halves of a friction may turn that turns as no library knows."""
-
 MOST_DOUBLINGS = 4
 """How often the way along such a shape is made twice as long while the fit stays as good."""
 

@@ -90,3 +90,20 @@ def test_another_recording_is_no_other_samples_of_it(nothing_missing, laboratory
     bench, _ = nothing_missing
     with pytest.raises(ValueError, match="is another recording, or other periods of it"):
         bench.comparing(subset(bench.data, [0, 1, 2, 3]))
+
+
+@pytest.mark.parametrize("name", ["rigid_bodies", "rotor_inertia", "base_tilt"])
+@pytest.mark.parametrize("signal", [None, make_effect("encoder_eccentricity", "knee", sine=0.02, cosine=0.01)])
+def test_what_bodies_do_is_told_by_as_many_samples_as_its_harmonics_ask_for(nothing_missing, name, signal):
+    bench, now = nothing_missing
+    assert bench.stride > 1
+    signals = () if signal is None else (signal,)
+    effect = bench.anchored((*now.fit.effects, make_effect(name)), now.fit.parameters)[-1]
+    assert effect.smooth
+    whole = bench.spectra_of(effect.evaluate(bench.state(signals)), signals)
+    few = bench.columns_behind(effect, signals)
+    size = np.sqrt(np.sum(np.abs(whole) ** 2, axis=(0, 1)))
+    off = np.sqrt(np.sum(np.abs(few - without_digits(whole)) ** 2, axis=(0, 1)))
+    assert np.max(size) > 0.0
+    assert np.all(off < 1e-6 * np.max(size))
+    assert len(bench.few_of_state(signals).motion) * bench.stride == bench.data.samples
