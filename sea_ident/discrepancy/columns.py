@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TypeAlias
 from zlib import crc32
 
@@ -19,10 +18,6 @@ VARIANTS_KEPT = 3e8
 
 COLUMNS_KEPT = 3e8
 """Bytes of columns of effects that are kept."""
-
-SAMPLES_PER_HARMONIC = 4
-"""Samples of the dynamics of bodies for every harmonic that is compared: what folds back into these is three times as
-high, where a motion has next to nothing [-]."""
 
 STATES_KEPT = 12
 """Motions, each corrected by other effects in the chain of signals, that are kept."""
@@ -65,7 +60,6 @@ class Evaluated:
 
     Attributes:
         states: robot and mean motion behind effects in the chain of signals.
-        few: the same in the samples that tell what bodies do.
         columns: spectra (H + 1, E, k) of effects behind these.
         size: of the columns [bytes].
         labels: of the columns of effects.
@@ -77,7 +71,6 @@ class Evaluated:
     """
 
     states: dict[tuple[Effect, ...], State] = field(default_factory=dict)
-    few: dict[tuple[Effect, ...], State] = field(default_factory=dict)
     columns: dict[tuple[Effect, tuple[Effect, ...]], ComplexArray] = field(default_factory=dict)
     size: int = 0
     labels: dict[Effect, tuple[Column, ...]] = field(default_factory=dict)
@@ -113,26 +106,6 @@ class Columns:
             self._evaluated.states[signals] = State(self.robot, motion, self.data.channels)
         return self._evaluated.states[signals]
 
-    @cached_property
-    def stride(self) -> int:
-        """Every which sample is enough for the dynamics of bodies: the largest divisor of their number."""
-        samples, harmonics = self.data.samples, self.data.harmonics
-        enough = max(SAMPLES_PER_HARMONIC * harmonics, harmonics + self.data.reach + 1)
-        return max(k for k in range(1, samples + 1) if samples % k == 0 and (k == 1 or samples // k >= enough))
-
-    def few_of_state(self, effects: Sequence[Effect]) -> State:
-        """The same in every sample that `stride` leaves: as many as what bodies do asks for."""
-        if self.stride == 1:
-            return self.state(effects)
-        signals = moving(signal_effects(effects))
-        if signals not in self._evaluated.few:
-            if len(self._evaluated.few) > STATES_KEPT:
-                self._evaluated.few.pop(next(k for k in self._evaluated.few if k))
-            whole, some = self.state(effects), slice(None, None, self.stride)
-            channels = {kind: values[some] for kind, values in self.data.channels.items()}
-            self._evaluated.few[signals] = State(self.robot, whole.motion[some], channels)
-        return self._evaluated.few[signals]
-
     def column_spectra(self, effect: Effect, effects: Sequence[Effect]) -> ComplexArray:
         """(H + 1, E, k) columns of one effect within a model."""
         return self.columns_behind(effect, signal_effects(effects))
@@ -145,8 +118,7 @@ class Columns:
             if self._evaluated.size > COLUMNS_KEPT:
                 self._evaluated.columns.clear()
                 self._evaluated.size = 0
-            state = self.few_of_state(signals) if effect.smooth else self.state(signals)
-            found = without_digits(self._spectra(effect.evaluate(state), signals))
+            found = without_digits(self._spectra(effect.evaluate(self.state(signals)), signals))
             self._evaluated.columns[key] = found
             self._evaluated.size += found.nbytes
         return self._evaluated.columns[key]
@@ -196,9 +168,8 @@ class Columns:
 
     def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
         """Equations with anything in them, and the spectra (H + 1, e, v, ...) of all parts there."""
-        time = self.data.motion.time[:: self.data.samples // len(parts[0].link)]
         for signal in signals:
-            parts = [signal.shifted(self.robot, time, part) for part in parts]
+            parts = [signal.shifted(self.robot, self.data.motion.time, part) for part in parts]
         touched, found = [], []
         joints = {part.joint for part in parts}
         for e, equation in enumerate(self.data.equations):
@@ -208,7 +179,7 @@ class Columns:
             if any(np.any(row) for row in rows):
                 touched.append(e)
                 found.append(np.stack(rows, axis=1) if len(rows) > 1 else rows[0][:, None])
-        shape = (len(time), 0, len(parts), *parts[0].link.shape[2:])
+        shape = (self.data.samples, 0, len(parts), *parts[0].link.shape[2:])
         every = np.stack(found, axis=1) if found else np.zeros(shape)
         return np.array(touched, dtype=np.intp), spectrum(every, self.data.harmonics)
 

@@ -20,6 +20,10 @@ from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.robot.model import LONGEST_LEVER
 
+SAMPLES_PER_HARMONIC = 4
+"""Samples of the derivatives of the dynamics for every harmonic that is compared: what folds back into these is three
+times as high, where a motion has next to nothing [-]."""
+
 SIGNALS_KEPT = 12
 """Errors of the encoders of which the deflections are kept."""
 
@@ -232,7 +236,7 @@ class Tangents(Columns):
         Evaluated at some samples, as many as its harmonics ask for.
         """
         robot, count = self.robot, len(state.motion)
-        some = slice(None, None, self.stride)
+        some = slice(None, None, self._stride)
         low, high = low[some], high[some]
         dx = robot.extended_state(high.q, high.theta) - robot.extended_state(low.q, low.theta)
         dv = robot.extended_rate(high.dq, high.dtheta) - robot.extended_rate(low.dq, low.dtheta)
@@ -243,15 +247,22 @@ class Tangents(Columns):
         by_position, by_velocity, mass = self._dynamics_derivatives(state, parameters)
         torque = np.einsum("kij,kj->ki", by_position, dx) + np.einsum("kij,kj->ki", by_velocity, dv)
         torque += np.einsum("kij,kj->ki", mass, da)
-        torque = torque if self.stride == 1 else np.asarray(resample(torque, count, axis=0))
+        torque = torque if self._stride == 1 else np.asarray(resample(torque, count, axis=0))
         return np.stack([torque @ robot.link_map, torque @ robot.motor_map])
+
+    @cached_property
+    def _stride(self) -> int:
+        """Every which sample is enough for the derivatives of the dynamics: the largest divisor of their number."""
+        samples, harmonics = self.data.samples, self.data.harmonics
+        enough = max(SAMPLES_PER_HARMONIC * harmonics, harmonics + self.data.reach + 1)
+        return max(k for k in range(1, samples + 1) if samples % k == 0 and (k == 1 or samples // k >= enough))
 
     def _dynamics_derivatives(
         self, state: State, parameters: dict[str, float]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Derivatives (K, nv, nv) of the torque of bodies and rotors with position, velocity, acceleration.
 
-        At every sample that `stride` leaves.
+        At every sample that `_stride` leaves.
 
         The torque is linear in the inertial parameters. Where a body that slides has a first moment without a mass,
         which is no lever, or a rotor has no inertia, more is put on every body and its own derivative taken off again.
@@ -275,7 +286,7 @@ class Tangents(Columns):
                 robot.with_inertial_parameters(inertial + offset * unit, rotors + 2.0 * spare),
                 robot.with_inertial_parameters(offset * unit, np.full_like(rotors, 2.0 * spare)),
             ]
-        motion = state.motion[:: self.stride]
+        motion = state.motion[:: self._stride]
         x = np.ascontiguousarray(robot.extended_state(motion.q, motion.theta))
         v = np.ascontiguousarray(robot.extended_rate(motion.dq, motion.dtheta))
         a = np.ascontiguousarray(robot.extended_rate(motion.ddq, motion.ddtheta))

@@ -117,8 +117,6 @@ class Effect(ABC):
     """Place on the way from what is recorded to the bodies: an encoder errs before the link bends behind it."""
     depends_on: ClassVar[tuple[str, ...]] = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta")
     """Parts of a motion that its columns depend on; a design takes no derivatives by the others."""
-    smooth: ClassVar[bool] = False
-    """Whether its columns have about the harmonics of the motion: as many samples as these ask for tell them."""
 
     @abstractmethod
     def columns(self, robot: Robot) -> tuple[Column, ...]:

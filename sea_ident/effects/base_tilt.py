@@ -65,7 +65,6 @@ class BaseTilt(Effect):
     name: ClassVar[str] = "base_tilt"
     side: ClassVar[Side] = Side.LINK
     source: ClassVar[str] = "Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, section 9.3"
-    smooth: ClassVar[bool] = True
     depends_on: ClassVar[tuple[str, ...]] = ("q",)
 
     def __post_init__(self) -> None:

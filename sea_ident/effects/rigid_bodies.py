@@ -17,7 +17,6 @@ class RigidBodies(Effect):
     name: ClassVar[str] = "rigid_bodies"
     side: ClassVar[Side] = Side.BOTH
     source: ClassVar[str] = "Hollerbach, Khalil, Gautier, Model identification, Springer Handbook of Robotics, 2008"
-    smooth: ClassVar[bool] = True
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:

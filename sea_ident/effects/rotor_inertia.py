@@ -19,7 +19,6 @@ class RotorInertia(Effect):
     name: ClassVar[str] = "rotor_inertia"
     side: ClassVar[Side] = Side.BOTH
     source: ClassVar[str] = "Vantilt et al., ICRA 2015, eqs. 1-5"
-    smooth: ClassVar[bool] = True
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:

@@ -55,19 +55,14 @@ def test_columns_see_every_signal_that_concerns_them(nothing_missing, name):
     library["torque_ripple", "hip"] = make_effect("torque_ripple", "hip", order=8.0)
     effect = next(e for (kind, joint), e in library.items() if kind == name and joint in ("hip", None))
     for signals in [(), (delays[0],), (delays[1],), (delays[0], delays[1]), tuple(delays)]:
-        motion = corrected_motion(bench.robot, signals, bench.data.motion)
-
-        def expected(some, signals=signals, motion=motion):
-            part = effect.evaluate(State(bench.robot, motion[some]))
-            for signal in signals:
-                part = signal.shifted(bench.robot, bench.data.motion.time[some], part)
-            rows = np.stack([equation_row(equation, part) for equation in bench.data.equations], axis=1)
-            return without_digits(spectrum(rows, bench.data.harmonics))
-
-        behind = expected(slice(None, None, bench.stride if effect.smooth else 1))
-        np.testing.assert_allclose(bench.columns_behind(effect, signals), behind, atol=1e-12)
+        part = effect.evaluate(State(bench.robot, corrected_motion(bench.robot, signals, bench.data.motion)))
+        for signal in signals:
+            part = signal.shifted(bench.robot, bench.data.motion.time, part)
+        rows = np.stack([equation_row(equation, part) for equation in bench.data.equations], axis=1)
+        expected = without_digits(spectrum(rows, bench.data.harmonics))
+        np.testing.assert_allclose(bench.columns_behind(effect, signals), expected, atol=1e-12)
         alone = bench.variant_spectra((effect,), (*bench.effects, *signals))
-        np.testing.assert_allclose(alone[1][:, :, 0], expected(slice(None))[:, alone[0]], atol=1e-12)
+        np.testing.assert_allclose(alone[1][:, :, 0], expected[:, alone[0]], atol=1e-12)
 
 
 def test_what_only_delays_a_torque_changes_no_motion(laboratory):
@@ -95,20 +90,3 @@ def test_another_recording_is_no_other_samples_of_it(nothing_missing, laboratory
     bench, _ = nothing_missing
     with pytest.raises(ValueError, match="is another recording, or other periods of it"):
         bench.comparing(subset(bench.data, [0, 1, 2, 3]))
-
-
-@pytest.mark.parametrize("name", ["rigid_bodies", "rotor_inertia", "base_tilt"])
-@pytest.mark.parametrize("signal", [None, make_effect("encoder_eccentricity", "knee", sine=0.02, cosine=0.01)])
-def test_what_bodies_do_is_told_by_as_many_samples_as_its_harmonics_ask_for(nothing_missing, name, signal):
-    bench, now = nothing_missing
-    assert bench.stride > 1
-    signals = () if signal is None else (signal,)
-    effect = bench.anchored((*now.fit.effects, make_effect(name)), now.fit.parameters)[-1]
-    assert effect.smooth
-    whole = bench.spectra_of(effect.evaluate(bench.state(signals)), signals)
-    few = bench.columns_behind(effect, signals)
-    size = np.sqrt(np.sum(np.abs(whole) ** 2, axis=(0, 1)))
-    off = np.sqrt(np.sum(np.abs(few - without_digits(whole)) ** 2, axis=(0, 1)))
-    assert np.max(size) > 0.0
-    assert np.all(off < 1e-6 * np.max(size))
-    assert len(bench.few_of_state(signals).motion) * bench.stride == bench.data.samples
