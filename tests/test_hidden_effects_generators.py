@@ -3,6 +3,7 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -25,9 +26,9 @@ from sea_ident.effects import (
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.regressor import build_regressor
-from tests.benchmarks.hidden_effects import catalogue, forms, gap, sensors
+from tests.benchmarks.hidden_effects import catalogue, forms, gap, generate, project_engine, sensors
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
-from tests.benchmarks.hidden_effects.draw import draw_case
+from tests.benchmarks.hidden_effects.draw import draw_case, trajectories_of, truth_of
 from tests.benchmarks.hidden_effects.drawn_robots import MOST_JOINTS, drawn_name, drawn_robot
 from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
 from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
@@ -373,3 +374,35 @@ def test_robots_that_are_drawn_are_robots(index: int) -> None:
         assert gravity[:, i].max() < 0.25 * truth.stiffness[i]
     assert np.all(truth.coulomb > 0.0)
     assert np.all(truth.viscous > 0.0)
+
+
+class _Asked(Exception):
+    """What a simulator was asked for."""
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "project"])
+def test_what_drifts_does_so_by_the_clock_however_long_a_recording_is(monkeypatch, engine):
+    """It is one robot: in the shorter recording it has not come as far."""
+    drift = Planted("friction_drift", "knee", "library", 0.5, {"kind": 1.0}, 0.01, 0.01)
+    case = replace(draw_case(11, "none", 0), robot="exo_leg", engine=engine, planted=(drift,))
+    assert case.holdout_periods < case.periods
+
+    def mujoco(*given, course=None, **options):
+        if course is None:  # without noise, for the size of the torque
+            return SimpleNamespace(tau_motor=np.ones((4, 3)))
+        raise _Asked(course)
+
+    def project(*given, effects, **options):
+        raise _Asked(tuple((e.effect, tuple(e.values)) for e in effects))
+
+    monkeypatch.setattr(generate, "simulate_mujoco", mujoco)
+    monkeypatch.setattr(project_engine, "simulate", project)
+    truth, (series, _) = truth_of(case), trajectories_of(case)
+    asked = []
+    for number, periods in enumerate((case.periods, case.holdout_periods)):
+        with pytest.raises(_Asked) as found:
+            generate._recording(case, truth, series, periods, case.planted, number, "")
+        asked.append(found.value.args[0])
+    assert asked[0] == asked[1]
+    if engine == "mujoco":
+        assert asked[0] == case.periods * case.period

@@ -121,9 +121,7 @@ def diagnose(
     wrong = (*check.wrong_columns(robot, model.effects, processed), *other_torque_units(model, processed))
     notes = check.Findings((*notes.warnings, *wrong), fatal=notes.fatal or bool(wrong))
     notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
-    changing = Changing(
-        check.temperatures(recording, data), tuple((t.effect.name, t.effect.joint) for t in model.trends)
-    )
+    changing = Changing.of(model, recording, data)
     bench = Bench(data, model_effects(model))
     tell("searching", 0.1)
     basic = completed(bench)

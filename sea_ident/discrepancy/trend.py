@@ -330,7 +330,8 @@ def _trend(
     alternatives = as_good(numbers, directions, middle, own, held)
     at_start = _at_start(direction, values.values)
     # of a share of what drifts itself: d (v / (1 + v c)) = (1 / (1 + v c))^2 dv
-    stds = values.stds * (at_start / np.where(values.values == 0.0, 1.0, values.values)) ** 2
+    share = np.divide(at_start, values.values, out=np.ones_like(at_start), where=values.values != 0.0)
+    stds = values.stds * share**2
     bends = [d for d in directions if d.name == direction.name and d.bent]
     if bends and not direction.bent:
         bent = max(bends, key=lambda d: gain(numbers, d, held)[0])

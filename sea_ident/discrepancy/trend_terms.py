@@ -35,6 +35,7 @@ def trend_terms(
         level = float(np.mean(changes(bench.data, effect, temperature)))
         values = effect.referred(trend.values, -level)
         # d (v / (1 + v c)) = (1 / (1 + v c))^2 dv, where columns drift themselves
-        stds = trend.stds * (values / np.where(trend.values == 0.0, 1.0, trend.values)) ** 2
+        share = np.divide(values, trend.values, out=np.ones_like(values), where=trend.values != 0.0)
+        stds = trend.stds * share**2
         found.append(TrendTerm(effect.about(level), tuple(map(float, values)), tuple(map(float, stds))))
     return tuple(found)

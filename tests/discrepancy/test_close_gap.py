@@ -194,9 +194,9 @@ def test_what_speaks_against_a_repaired_model_is_said_where_nothing_is_missing_t
 
 
 @pytest.mark.scenario
-def test_what_no_model_holds_was_not_added(models, recordings, monkeypatch):
-    """What differs from a reference: named beside what is added."""
-    named = ("payload", "ankle")
+@pytest.mark.parametrize("named", [("payload", "ankle"), ("friction_drift", "knee")], ids=lambda pair: pair[0])
+def test_what_no_model_holds_was_not_added(models, recordings, monkeypatch, named):
+    """What differs from a reference, what drifts and is not in the model: named beside what is added."""
     missing = (MissingEffect(*named, (), 0.2, 1e-9, ()), MissingEffect("torque_ripple", "hip", (), 0.1, 1e-9, ()))
     first = Diagnosis(Verdict.NAMED, "", NOTHING_LACKS, missing=missing, model=models[1])
     rounds = iter([first, Diagnosis(Verdict.NONE, "", NOTHING_LACKS, model=models[1])])

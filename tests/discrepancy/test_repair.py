@@ -138,6 +138,15 @@ def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, drifted):
             assert abs(mean.value + change * term.values[1] - true - 3.0 * warming(time, 60.0)) < 3.0 * std
 
 
+def test_a_small_drift_is_named_and_is_no_part_of_the_mean(leg, series):
+    drift = planted("friction_drift", "knee", [0.3, 0.5], time_constant=60.0)
+    recording = simulate(leg, series[0], periods=12, seed=70, effects=[drift]).recording
+    found = diagnosed(identified(leg, recording), recording)
+    assert ("friction_drift", "knee") in [(m.effect, m.joint) for m in found.missing]
+    assert "friction_drift" not in [effect.name for effect in found.model.effects]
+    assert "friction_drift" in [trend.effect.name for trend in found.model.trends]
+
+
 @pytest.mark.scenario
 def test_nothing_is_left_to_name_beside_what_drifts_in_the_model(leg, series, drifted, tmp_path):
     kind, recording, found = drifted

@@ -18,6 +18,7 @@ from sea_ident.discrepancy.trend_search import (
     best_trend,
     find_trends,
 )
+from sea_ident.discrepancy.trend_values import CourseValues
 from sea_ident.effects import make_effect
 from sea_ident.effects.drift import warming
 
@@ -236,3 +237,13 @@ def test_a_trend_that_the_model_has_keeps_its_place_and_another_is_looked_for_be
     assert find_trends(nothing, directions, MIDDLE, FLOOR, 3, 1e-3, lambda d, v: True, known) == []
     (only,) = find_trends(flat, directions, MIDDLE, FLOOR, 1, 1e-3, lambda d, v: True, known)
     assert only.direction.effect.joint == "hip"
+
+
+def test_a_value_that_is_nothing_is_as_unsure_as_any():
+    (one,) = axes(1)
+    directions = trend(one, "hip")
+    flat = noisy(np.random.default_rng(12), np.outer(0.8 * MIDDLE, one))
+    chosen = find_trends(flat, directions, MIDDLE, FLOOR, 1, 1e-3, lambda d, v: True)
+    nothing = CourseValues(np.zeros(1), np.array([0.1]))
+    told = _trend(flat, chosen, 0, directions, MIDDLE, lambda d, v: 0.1, lambda own, beside: nothing)
+    assert told.stds == pytest.approx([0.1])

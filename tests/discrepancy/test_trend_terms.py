@@ -49,6 +49,13 @@ def test_a_share_of_a_torque_that_drifts_itself_is_that_of_the_mean(settled):
     assert term.effect.coulomb == pytest.approx(fit.parameters["knee.coulomb_friction"])
 
 
+def test_what_is_told_as_nothing_is_as_unsure_as_before(settled):
+    bench, fit = settled
+    found = Trend(make_effect("friction_drift", "knee"), np.array([0.0, 0.5]), np.array([0.1, 0.05]), 100.0, 1e-9, 0.02)
+    (term,) = trend_terms(bench, fit, [found])
+    assert term.stds == (0.1, 0.05)
+
+
 def test_friction_by_temperature_is_none_at_the_mean_temperature(settled):
     bench, fit = settled
     temperature = np.full((12, 3), 20.0) + np.linspace(0.0, 11.0, 12)[:, None]
