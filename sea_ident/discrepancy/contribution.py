@@ -35,10 +35,10 @@ def as_known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
     return Known(contribution(bench, fit, positions), stiffness)
 
 
-def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
-    """(N, E) standard deviation of the torque of an effect over a period, from that of its parameters and shapes.
+def torque_factor(bench: Bench, fit: Fit, position: int) -> ComplexArray:
+    """(H + 1, E, r) factor of the covariance of the torque of an effect on the motion of a bench, which may be another.
 
-    Larger in proportion where the model leaves more than noise.
+    From that of its parameters and shapes; larger in proportion where the model leaves more than noise.
     """
     effect, count = fit.effects[position], len(fit.columns)
     start = sum(bench.counts(fit.effects)[:position])
@@ -52,7 +52,13 @@ def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
         directions.append(bench.tangents(fit.effects, fit.columns, fit.values, [pair for _, pair in own])[0])
         factors.append(fit.covariance_factor[[count + k for k, _ in own]])
     if not directions:
-        return np.zeros((bench.data.samples, len(bench.data.equations)))
-    rows = waveform(np.concatenate(directions, axis=2), bench.data.samples)
-    larger = np.sqrt(fit.unit)
-    return np.asarray(larger * np.linalg.norm(rows @ np.concatenate(factors), axis=2), dtype=np.float64)
+        return np.zeros((bench.data.harmonics + 1, len(bench.data.equations), 0), dtype=np.complex128)
+    # no more columns than there are parameters and shapes
+    least = np.linalg.qr(np.concatenate(factors).T)[1].T
+    return np.asarray(np.sqrt(fit.unit) * (np.concatenate(directions, axis=2) @ least), dtype=np.complex128)
+
+
+def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
+    """(N, E) standard deviation of the torque of an effect over a period."""
+    rows = waveform(torque_factor(bench, fit, position), bench.data.samples)
+    return np.asarray(np.linalg.norm(rows, axis=2), dtype=np.float64)

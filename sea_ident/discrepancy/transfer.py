@@ -8,10 +8,11 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.columns import effect_key
-from sea_ident.discrepancy.contribution import as_known
+from sea_ident.discrepancy.contribution import as_known, torque_factor
 from sea_ident.discrepancy.fit import Fit, Known
 from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, significance
+from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
@@ -47,8 +48,8 @@ class Transfer:
     Attributes:
         share: of what it could explain there, what it does explain with its parameters as they are [-].
         tested: whether there was enough to explain to tell.
-        statistic: weighted sum of squares that is left there with its parameters as they are.
-        excess: what of it is beyond the noise.
+        statistic: weighted sum of squares that is left there with its parameters as sure as they are.
+        excess: what is left beyond the noise with its parameters as they are.
         unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
         remembers: whether it needs a constant torque of its own there, which depends on what was before.
         possible: what it could explain there, in the unit of the statistic.
@@ -116,10 +117,12 @@ def far_behind(bench: Bench, selection: Selection, now: Settled, position: int, 
     """
     fit, unit = selection.final.fit, now.fit.unit
     added = range(len(fit.effects) - selection.added, len(fit.effects))
-    fixed, remembers = _Trial(bench, fit, added, now, position).as_found()
-    if fixed.statistic - beside.statistic < FAR_BEHIND * beside.margin:
+    trial = _Trial(bench, fit, added, now, position)
+    fixed, remembers = trial.as_found()
+    enough = beside.statistic + FAR_BEHIND * beside.margin
+    if fixed.statistic < enough or (statistic := trial.as_sure_as_found(fixed)) < enough:
         return None
-    return Transfer(0.0, True, fixed.statistic, unit, fixed.excess, remembers)
+    return Transfer(0.0, True, statistic, unit, fixed.excess, remembers)
 
 
 class _AsFound(NamedTuple):
@@ -175,7 +178,24 @@ class _Trial:
                 tested = self._tells(without, alone().statistic)
             share = max(share, self._share_beside_free(), self._share_by_values())
         possible = without.statistic - min(free.statistic, fixed.statistic)
-        return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers, possible)
+        return Transfer(share, tested, self.as_sure_as_found(fixed), unit, fixed.excess, remembers, possible)
+
+    def as_sure_as_found(self, fixed: Fit) -> float:
+        """What the effect as it was found leaves, where its parameters are only as sure as that motion made them.
+
+        Twice the negative logarithm of the probability density of what is left, but for a constant: a combination of
+        parameters that the first motion hardly tells may do much on another one, and is off by chance. What could be
+        off by more explains more of that, and pays for it.
+
+        Args:
+            fixed: the model with the effect as it was found.
+        """
+        bench, unit = self._bench, self._now.fit.unit
+        factor = torque_factor(bench, self._fit, self._position) * fixed.scale[:, None]
+        rows = fixed.off(whiten(bench.whitener(self._now.noise), factor)) / np.sqrt(unit)
+        sizes, axes = np.linalg.svd(rows, full_matrices=False)[1::-1]
+        taken = (axes.T @ fixed.whitened) ** 2 * (sizes**2 / (1.0 + sizes**2))
+        return float(fixed.statistic - np.sum(taken) + unit * np.sum(np.log1p(sizes**2)))
 
     def _beside(self) -> list[Effect]:
         """What stands beside the torque of the others that is known: their signals, and what their springs remember."""

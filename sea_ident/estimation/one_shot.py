@@ -216,6 +216,7 @@ def _result(first: Model, values: FloatArray, influences: FloatArray, inverse: F
     """The two-step model with the values of the one-shot estimation."""
     count, periods = first.base.rank, len(influences)
     covariance = influences.T @ influences * (periods / (periods - 1.0))
+    remainder = first.uncertainty.kind is CovarianceKind.REMAINDER
     rest = first.uncertainty.covariance - first.uncertainty.repeatability
     own = covariance[:count, :count] + rest
     springs = []
@@ -228,7 +229,7 @@ def _result(first: Model, values: FloatArray, influences: FloatArray, inverse: F
     uncertainty = Uncertainty(
         covariance=own,
         degrees_of_freedom=periods - 1.0,
-        kind=CovarianceKind.REMAINDER if np.any(rest) else CovarianceKind.PERIODS,
+        kind=CovarianceKind.REMAINDER if remainder else CovarianceKind.PERIODS,
         influences=influences[:, :count],
         repeatability=covariance[:count, :count],
     )

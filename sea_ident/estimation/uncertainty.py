@@ -11,6 +11,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators import Estimate
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.period_scores import period_scores
+from sea_ident.estimation.turning import turning_covariance
 
 FEWEST_BLOCKS = 20
 """Smallest number of pieces of a period from which a covariance is estimated."""
@@ -25,7 +26,7 @@ DRIFT = 0.95
 """Probability with which chance keeps the difference of whole periods below what counts as drift."""
 
 MISFIT = 1.5
-"""Energy of the mean residual over that of its noise from which on the model is taken to lack something."""
+"""Energy of the mean residual over that of its noise from which on the model is said to lack something."""
 
 
 class CovarianceKind(StrEnum):
@@ -115,16 +116,21 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
         kind = CovarianceKind.BLOCKS
     found = (*drifted, *_disagreement(observations, estimate, covariance))
     misfit, text = _misfit(observations, estimate, residuals)
-    if misfit is None:
-        return Uncertainty(covariance, freedom, kind, influences, covariance, found)
-    return Uncertainty(covariance + misfit, freedom, CovarianceKind.REMAINDER, influences, covariance, (*found, text))
+    if text:
+        kind, found = CovarianceKind.REMAINDER, (*found, text)
+    return Uncertainty(covariance + misfit, freedom, kind, influences, covariance, found)
 
 
-def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray | None, str]:
+def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray, str]:
     """Covariance from the part of the mean residual that repeats in every period, so is no noise.
 
     It is treated as a random error with the correlation that the residual shows along the period: that is what an
-    interval can say of a model error that nobody has named. Only what moves the estimate counts.
+    interval can say of a model error that nobody has named. Only what moves the estimate counts. So does what is too
+    little to be sure of: friction turns over otherwise than modelled by a tenth of the noise, and gathers in the
+    parameters of that friction.
+
+    Returns:
+        (b, b) covariance, and in words what lacks; empty where no more is left than may be noise.
     """
     mean = observations.residual(estimate.values)
     if estimate.period_torque is not None:
@@ -136,10 +142,13 @@ def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArra
     noise = (residuals**2).sum(axis=0) / (periods * (periods - 1.0))
     noise_energy, energy = (estimate.weights * noise).sum(axis=0), (estimate.weights * mean**2).sum(axis=0)
     ratio = energy / np.maximum(noise_energy, 1e-300)
+    if noise_energy.max() <= 0.0:
+        return np.zeros((len(estimate.values),) * 2), ""
+    covariance = _scores(observations, estimate, mean * np.sqrt(1.0 - 1.0 / np.maximum(ratio, 1.0)))
+    covariance += turning_covariance(observations, estimate, mean, residuals)
     large = ratio > MISFIT
-    if not np.any(large) or noise_energy.max() <= 0.0:
-        return None, ""
-    beyond = mean * np.sqrt(np.where(large, 1.0 - 1.0 / ratio, 0.0))
+    if not np.any(large):
+        return covariance, ""
     names = observations.robot.joint_names
     parts = ", ".join(f"{names[i]} {ratio[i] ** 0.5:.2g} times" for i in np.flatnonzero(large))
     steps = observations.processed.encoder_steps
@@ -153,7 +162,7 @@ def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArra
         f"the residual of the mean is larger than its noise ({parts}): {cause}. Standard deviations count this as "
         "random; diagnose tells what it is"
     )
-    return _scores(observations, estimate, beyond), text
+    return covariance, text
 
 
 def _disagreement(observations: Observations, estimate: Estimate, covariance: FloatArray) -> tuple[str, ...]:

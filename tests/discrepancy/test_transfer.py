@@ -1,8 +1,13 @@
 """Whether an effect holds on another motion: what it is worth there, and what is not its own fault."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.contribution import torque_factor
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.discrepancy.transfer import Transfer, _Trial, transfer
@@ -112,3 +117,67 @@ def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory, 
     assert [outcome.tested for outcome in outcomes] == [True, True, True]
     assert [outcome.share for outcome in outcomes] == [same, less, shaped]
     assert [outcome.holds for outcome in outcomes] == [True, False, False]
+
+
+@pytest.fixture(scope="module")
+def elsewhere(laboratory, rippled):
+    """Gives trials of that ripple on another motion that shows its values far better, these off by some amount."""
+    bench, _, found = rippled
+    planted = [("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})]
+    other = Bench(laboratory.data(laboratory.record(planted, periods=5, motion=1, seed=8)), bench.effects)
+    fit, position = found.fit, len(found.fit.effects) - 1
+    now = settle_again(other, other.predicted(fit.effects, fit.parameters))
+    own = slice(len(fit.columns) - 2, len(fit.columns))
+
+    def trial(off=0.0, unsure=10.0):
+        # off in the direction that the first motion told least, which was `unsure` times less sure of all; its order
+        # is as it was
+        less_sure = replace(fit)
+        factor = unsure * fit.covariance_factor[len(fit.columns) - 2 :]
+        object.__setattr__(less_sure, "covariance_factor", unsure * fit.covariance_factor)
+        information, directions = np.linalg.eigh(np.linalg.inv(factor @ factor.T)[:2, :2])
+        values = fit.values.copy()
+        values[own] += off / np.sqrt(information[0]) * directions[:, 0]
+        object.__setattr__(less_sure, "values", values)
+        return _Trial(other, less_sure, range(position, position + 1), now, position)
+
+    return other, now, trial
+
+
+@pytest.mark.scenario
+def test_an_effect_is_as_sure_elsewhere_as_it_was_found(elsewhere):
+    """The density of what is left, against the full covariance matrix of it."""
+    other, now, trial = elsewhere
+    one = trial(off=2.0)
+    fixed, _ = one.as_found()
+    rows = torque_factor(other, one._fit, one._position) * fixed.scale[:, None]
+    free = fixed.off(other.whitening(now.noise).flat(rows))
+    unit = now.fit.unit
+    covariance = unit * np.eye(len(fixed.whitened)) + free @ free.T
+    expected = unit * (
+        fixed.whitened @ np.linalg.solve(covariance, fixed.whitened) + np.linalg.slogdet(covariance / unit)[1]
+    )
+    assert np.linalg.norm(free) > 3.0
+    assert one.as_sure_as_found(fixed) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.scenario
+def test_what_the_first_motion_hardly_told_is_not_held_against_an_effect(elsewhere):
+    """Values that are off by two of their own standard deviations are nothing; by ten, they are wrong."""
+    plain, fair = {}, {}
+    for off in (0.0, 2.0, 10.0):
+        one = elsewhere[2](off)
+        fixed, _ = one.as_found()
+        plain[off], fair[off] = fixed.statistic, one.outcome().statistic
+    assert plain[2.0] - plain[0.0] > 2.0 * EQUALLY_GOOD
+    assert abs(fair[2.0] - fair[0.0]) < 0.5 * EQUALLY_GOOD
+    assert fair[10.0] - fair[0.0] > 4.0 * EQUALLY_GOOD
+
+
+@pytest.mark.scenario
+def test_what_is_hardly_known_pays_for_all_that_it_may_be(elsewhere):
+    """It explains whatever is there, and that is no merit: the wider, the less likely each of it was."""
+    sure, unsure, vague = (elsewhere[2](unsure=unsure).outcome().statistic for unsure in (1.0, 30.0, 1e3))
+    assert unsure > sure + 1.0
+    # of two parameters and a shape, each a factor of 33
+    assert vague - unsure == pytest.approx(2.0 * 3.0 * np.log(1e3 / 30.0), rel=0.2)

@@ -36,16 +36,19 @@ def pieces(tmp_path_factory):
 
 
 def scores(pieces):
-    """(recordings, values) how far from the truth everything of the motors and springs is, in standard deviations."""
+    """(recordings, values) how far from the truth everything of the motors and springs is, in standard deviations.
+
+    Of the motors without what they know of a lack of the model: the bias is one of noise.
+    """
     robot, recordings = pieces
     out = []
     for recording in recordings:
         model = identify(robot, recording, period=PERIOD)
-        row = []
+        row, stds = [], np.sqrt(np.diag(model.uncertainty.repeatability))
         for joint in robot.joints:
             for name in ("rotor_inertia", "viscous_friction", "coulomb_friction"):
                 k = model.names.index(f"{joint.name}.{name}")
-                row.append((model.values[k] - getattr(joint.actuator, name)) / model.std[k])
+                row.append((model.values[k] - getattr(joint.actuator, name)) / stds[k])
         row.extend((s.stiffness - robot.spring(s.joint).stiffness) / s.stiffness_std for s in model.springs)
         out.append(row)
     return np.array(out)
