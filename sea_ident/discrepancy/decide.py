@@ -309,11 +309,11 @@ def _other_shapes(bench: Bench, fit: Fit, position: int) -> list[list[Effect]]:
 def _better(one: Transfer, other: Transfer, behind: float = 0.0) -> bool:
     """Whether one effect does better than another on the other motion beyond doubt, and holds there.
 
-    By so much more of the statistic as it was `behind` on the motion that was used.
+    By so much more of the surprise as it was `behind` on the motion that was used.
     """
     if not (one.tested and one.holds):
         return False
-    if other.remembers and not one.remembers and one.statistic + behind - other.statistic < EQUALLY_GOOD * one.unit:
+    if other.remembers and not one.remembers and one.surprise + behind - other.surprise < EQUALLY_GOOD * one.unit:
         # what is foretold is worth more than what is fitted there
         return True
-    return other.statistic - one.statistic > one.margin + behind
+    return other.surprise - one.surprise > one.margin + behind

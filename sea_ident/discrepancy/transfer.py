@@ -48,11 +48,13 @@ class Transfer:
     Attributes:
         share: of what it could explain there, what it does explain with its parameters as they are [-].
         tested: whether there was enough to explain to tell.
-        statistic: weighted sum of squares that is left there with its parameters as sure as they are.
-        excess: what is left beyond the noise with its parameters as they are.
+        statistic: weighted sum of squares that is left there with its parameters as they are.
+        excess: what of it is beyond the noise.
         unit: the statistic over its degrees of freedom with everything free, at least what noise leaves [-].
         remembers: whether it needs a constant torque of its own there, which depends on what was before.
         possible: what it could explain there, in the unit of the statistic.
+        by_chance: what of the statistic is likely chance, where its parameters are only as sure as they were found,
+            less the price of all that they may be.
     """
 
     share: float
@@ -62,10 +64,19 @@ class Transfer:
     excess: float = 0.0
     remembers: bool = False
     possible: float = np.inf
+    by_chance: float = 0.0
+
+    @property
+    def surprise(self) -> float:
+        """The statistic without what is chance of the motion that it was found on.
+
+        Twice the negative logarithm of the probability density of what is left, but for a constant.
+        """
+        return self.statistic - self.by_chance
 
     @property
     def margin(self) -> float:
-        """By how much more of the statistic another must leave to be the worse one beyond doubt."""
+        """By how much more surprising another must be to be the worse one beyond doubt."""
         return max(EQUALLY_GOOD * self.unit, UNDECIDED * self.excess)
 
     @property
@@ -119,10 +130,10 @@ def far_behind(bench: Bench, selection: Selection, now: Settled, position: int, 
     added = range(len(fit.effects) - selection.added, len(fit.effects))
     trial = _Trial(bench, fit, added, now, position)
     fixed, remembers = trial.as_found()
-    enough = beside.statistic + FAR_BEHIND * beside.margin
-    if fixed.statistic < enough or (statistic := trial.as_sure_as_found(fixed)) < enough:
+    enough = beside.surprise + FAR_BEHIND * beside.margin
+    if fixed.statistic < enough or fixed.statistic - (by_chance := trial.by_chance(fixed)) < enough:
         return None
-    return Transfer(0.0, True, statistic, unit, fixed.excess, remembers)
+    return Transfer(0.0, True, fixed.statistic, unit, fixed.excess, remembers, by_chance=by_chance)
 
 
 class _AsFound(NamedTuple):
@@ -178,14 +189,14 @@ class _Trial:
                 tested = self._tells(without, alone().statistic)
             share = max(share, self._share_beside_free(), self._share_by_values())
         possible = without.statistic - min(free.statistic, fixed.statistic)
-        return Transfer(share, tested, self.as_sure_as_found(fixed), unit, fixed.excess, remembers, possible)
+        by_chance = self.by_chance(fixed)
+        return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers, possible, by_chance)
 
-    def as_sure_as_found(self, fixed: Fit) -> float:
-        """What the effect as it was found leaves, where its parameters are only as sure as that motion made them.
+    def by_chance(self, fixed: Fit) -> float:
+        """What of the statistic is likely chance, where the parameters are only as sure as the first motion made them.
 
-        Twice the negative logarithm of the probability density of what is left, but for a constant: a combination of
-        parameters that the first motion hardly tells may do much on another one, and is off by chance. What could be
-        off by more explains more of that, and pays for it.
+        A combination of parameters that it hardly tells may do much on another motion, and is off by chance. What could
+        be off by more explains more of what is left there, and pays for it by the logarithm of that.
 
         Args:
             fixed: the model with the effect as it was found.
@@ -193,9 +204,9 @@ class _Trial:
         bench, unit = self._bench, self._now.fit.unit
         factor = torque_factor(bench, self._fit, self._position) * fixed.scale[:, None]
         rows = fixed.off(whiten(bench.whitener(self._now.noise), factor)) / np.sqrt(unit)
-        sizes, axes = np.linalg.svd(rows, full_matrices=False)[1::-1]
+        axes, sizes, _ = np.linalg.svd(rows, full_matrices=False)
         taken = (axes.T @ fixed.whitened) ** 2 * (sizes**2 / (1.0 + sizes**2))
-        return float(fixed.statistic - np.sum(taken) + unit * np.sum(np.log1p(sizes**2)))
+        return float(np.sum(taken) - unit * np.sum(np.log1p(sizes**2)))
 
     def _beside(self) -> list[Effect]:
         """What stands beside the torque of the others that is known: their signals, and what their springs remember."""

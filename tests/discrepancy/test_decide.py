@@ -317,6 +317,19 @@ def test_what_neither_explains_leans_to_none():
     assert _better(both[0], replace(both[1], statistic=both[1].statistic + 0.2 * left))
 
 
+def test_what_the_first_motion_hardly_told_decides_nothing_on_another():
+    """Both the better one beyond doubt, and the one that foretells what the other only fits."""
+    better = Transfer(share=0.99, tested=True, statistic=1055.0, excess=12.0)
+    worse = Transfer(share=0.99, tested=True, statistic=1082.0, excess=39.0)
+    unsure = replace(worse, by_chance=26.0)
+    assert _better(better, worse)
+    assert not _better(better, unsure)
+    assert not _better(unsure, better)
+    remembers = replace(better, remembers=True)
+    assert not _better(worse, remembers)
+    assert _better(unsure, remembers)
+
+
 @pytest.fixture(scope="module")
 def pushed(laboratory):
     """A push away from the centre of mass of the shank, found, and another motion of the same leg."""

@@ -9,6 +9,7 @@ import sea_ident
 from sea_ident.discrepancy.heldout import Kind, held_out, other_periods, tried, without_history
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.transfer import _Trial
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording
@@ -117,7 +118,7 @@ def test_what_an_effect_is_worth_does_not_depend_on_what_was_tried_before(labora
     assert apart.freed(None).count > compared == found.bench.freed(None).count
 
 
-def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripple):
+def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripple, monkeypatch):
     """And a fit would rule it out as well; what is not far behind is fitted, as if nothing stood beside it."""
     bench, selection = ripple
     found, _ = held_out(bench, selection, with_ripple)
@@ -138,6 +139,10 @@ def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripp
     # about the same in the noise floor of the better one as in its own
     assert behind.statistic == pytest.approx(fitted.statistic, rel=0.3)
     assert found.worth(right, position, own) == found.worth(right, position)
+    # nor is what is behind only where the first motion hardly told it
+    assert behind.surprise > own.surprise + own.margin
+    monkeypatch.setattr(_Trial, "by_chance", lambda trial, fixed: 0.9 * fixed.statistic)
+    assert found.worth(wrong, position, own) == found.worth(wrong, position)
     assert found.worth(right, position, own).holds
 
 

@@ -158,7 +158,7 @@ def test_an_effect_is_as_sure_elsewhere_as_it_was_found(elsewhere):
         fixed.whitened @ np.linalg.solve(covariance, fixed.whitened) + np.linalg.slogdet(covariance / unit)[1]
     )
     assert np.linalg.norm(free) > 3.0
-    assert one.as_sure_as_found(fixed) == pytest.approx(expected, rel=1e-9)
+    assert fixed.statistic - one.by_chance(fixed) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.scenario
@@ -167,8 +167,8 @@ def test_what_the_first_motion_hardly_told_is_not_held_against_an_effect(elsewhe
     plain, fair = {}, {}
     for off in (0.0, 2.0, 10.0):
         one = elsewhere[2](off)
-        fixed, _ = one.as_found()
-        plain[off], fair[off] = fixed.statistic, one.outcome().statistic
+        outcome = one.outcome()
+        plain[off], fair[off] = outcome.statistic, outcome.surprise
     assert plain[2.0] - plain[0.0] > 2.0 * EQUALLY_GOOD
     assert abs(fair[2.0] - fair[0.0]) < 0.5 * EQUALLY_GOOD
     assert fair[10.0] - fair[0.0] > 4.0 * EQUALLY_GOOD
@@ -177,7 +177,7 @@ def test_what_the_first_motion_hardly_told_is_not_held_against_an_effect(elsewhe
 @pytest.mark.scenario
 def test_what_is_hardly_known_pays_for_all_that_it_may_be(elsewhere):
     """It explains whatever is there, and that is no merit: the wider, the less likely each of it was."""
-    sure, unsure, vague = (elsewhere[2](unsure=unsure).outcome().statistic for unsure in (1.0, 30.0, 1e3))
+    sure, unsure, vague = (elsewhere[2](unsure=unsure).outcome().surprise for unsure in (1.0, 30.0, 1e3))
     assert unsure > sure + 1.0
     # of two parameters and a shape, each a factor of 33
     assert vague - unsure == pytest.approx(2.0 * 3.0 * np.log(1e3 / 30.0), rel=0.2)
