@@ -88,7 +88,8 @@ def identify(
         progress: called with what is being done and the share that is done.
 
     Returns:
-        The model. Its standard deviations are those that the spread between periods shows.
+        The model. Its standard deviations are those that the spread between periods shows, with what the model leaves
+        beyond its noise and how friction may turn over besides.
 
     Raises:
         RecordingError: the recording lacks what is needed.

@@ -83,6 +83,7 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
     The estimate solves ``Z' (torque - F values) = 0``, so period p moves it by ``(Z' F)^-1 Z' r_p / P``, with r_p the
     residual of that period at its own motion: noise of encoders and torque, coloured or not, and what the
     controller makes of both, are all inside. Whole periods are taken as independent; nothing is assumed within one.
+    What the mean residual is beyond that, and how friction may turn over, comes on top.
 
     Args:
         observations: the data.

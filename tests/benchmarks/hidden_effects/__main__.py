@@ -3,7 +3,7 @@
     python -m tests.benchmarks.hidden_effects run --cases N --seed S --out DIR [--row ROW] [--jobs 2]
     python -m tests.benchmarks.hidden_effects table DIR
     python -m tests.benchmarks.hidden_effects alone DIR [--all] [--row ROW]
-    python -m tests.benchmarks.hidden_effects springs DIR [--row ROW]
+    python -m tests.benchmarks.hidden_effects identified DIR [--row ROW]
 
 Robot, true parameters, trajectory, noise, effects, places and sizes of a case follow from the seed, the row and the
 number of the case. Two engines make the recordings: MuJoCo with forces and time stepping of the benchmark's own, and
@@ -11,7 +11,8 @@ the project's simulator. The diagnosis runs in a process of its own that gets th
 recordings and the nominal description; the truth is in `truth/<case>.json`, read by the scores alone. A run that was
 stopped goes on where it was. `table.txt`, `misses.txt` and `confusion.png` are written beside the cases. `alone` times
 those again that took too long side by side with others (of a run with `--keep`), or all, and tells which say
-something else than before. `springs` tells how far `identify` alone is off in springs meanwhile.
+something else than before. `identified` tells how far `identify` alone is off: in all that it tells where nothing is
+hidden, in springs everywhere.
 """
 
 import argparse
@@ -19,8 +20,8 @@ from pathlib import Path
 
 from tests.benchmarks.hidden_effects.alone import alone
 from tests.benchmarks.hidden_effects.draw import ROWS
+from tests.benchmarks.hidden_effects.identified import identified
 from tests.benchmarks.hidden_effects.runner import Task, run
-from tests.benchmarks.hidden_effects.springs import springs
 from tests.benchmarks.hidden_effects.table import write_report
 
 
@@ -45,12 +46,12 @@ def main() -> None:
     again.add_argument("out", type=Path)
     again.add_argument("--all", action="store_true", help="all cases")
     again.add_argument("--row", action="append", choices=list(ROWS), help="may be given more than once; default all")
-    alone_identified = verbs.add_parser("springs", help="how far identify alone is off in springs of kept cases")
-    alone_identified.add_argument("out", type=Path)
-    alone_identified.add_argument("--row", action="append", choices=list(ROWS), help="default all")
+    off = verbs.add_parser("identified", help="how far identify alone is off in kept cases")
+    off.add_argument("out", type=Path)
+    off.add_argument("--row", action="append", choices=list(ROWS), help="default all")
     arguments = parser.parse_args()
-    if arguments.verb == "springs":
-        for line in springs(arguments.out, arguments.row or ()):
+    if arguments.verb == "identified":
+        for line in identified(arguments.out, arguments.row or ()):
             print(line, flush=True)
         return
     if arguments.verb == "alone":
