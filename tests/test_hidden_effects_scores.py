@@ -11,10 +11,12 @@ import pytest
 pytest.importorskip("mujoco", reason="the cases of the benchmark are drawn with MuJoCo")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from sea_ident import Model, identify
 from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.diagnose_case import without_effects
 from tests.benchmarks.hidden_effects.draw import draw_case, truth_of
 from tests.benchmarks.hidden_effects.generate import case_folder, generate, truth_file
+from tests.benchmarks.hidden_effects.identified import _errors, identified
 from tests.benchmarks.hidden_effects.scoring import Score, score_case
 from tests.benchmarks.hidden_effects.sizes import size_errors, true_parameters
 from tests.benchmarks.hidden_effects.table import EASILY_TAKEN_FOR, either_way, lines_of, wilson, write_report
@@ -150,6 +152,35 @@ def test_the_folder_of_a_case_holds_nothing_of_the_truth(tmp_path: Path) -> None
     for path in folder.iterdir():
         assert b"ripple" not in path.read_bytes()
     assert Case.from_dict(json.loads(truth_file(tmp_path, case.label).read_text())) == case
+
+
+def test_identify_is_held_against_the_truth_where_nothing_is_hidden(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = replace(draw_case(1, "none", 2), period=4.0, periods=6, holdout_periods=1)
+    generate(case, tmp_path)
+    models: list[Model] = []
+
+    def kept(*given: object, **options: object) -> Model:
+        model = identify(*given, **options)  # type: ignore[arg-type]
+        # one of them off by five more of its standard deviations
+        off = np.where(np.arange(len(model.values)) == 3, 5.0, 0.0)
+        models.append(replace(model, values=model.values + off * model.std))
+        return models[-1]
+
+    monkeypatch.setattr("tests.benchmarks.hidden_effects.identified.identify", kept)
+    first, *rest = identified(tmp_path)
+    errors = _errors(models[0], truth_of(case))
+    assert 3.0 < errors[3] < 7.0
+    assert np.all(np.abs(np.delete(errors, 3)) < 4.0)
+    within = int(np.sum(np.abs(errors) < 2.0))
+    assert first.startswith(f"{case.label}: {within} of {len(errors)} within two standard deviations")
+    assert first.endswith(f"worst {errors[3]:.1f}; {models[0].names[3]} {errors[3]:.1f}")
+    of_springs = [line for line in rest if line.startswith(case.label)]
+    assert len(of_springs) == len(models[0].springs)
+    assert all("nothing hidden" in line for line in of_springs)
+    truth_file(tmp_path, case.label).write_text(json.dumps(replace(case, planted=(RIPPLE,)).to_dict()))
+    assert not [line for line in identified(tmp_path) if line.startswith(f"{case.label}: ")]
 
 
 def test_an_effect_can_be_taken_out_of_the_library() -> None:
