@@ -139,7 +139,8 @@ def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripp
     # about the same in the noise floor of the better one as in its own
     assert behind.statistic == pytest.approx(fitted.statistic, rel=0.3)
     assert found.worth(right, position, own) == found.worth(right, position)
-    # nor is what is behind only where the first motion hardly told it
+    # nor is what is behind one that is a surprise itself, or only where the first motion hardly told it
+    assert found.worth(wrong, position, replace(own, by_chance=-1e9)) == fitted
     assert behind.surprise > own.surprise + own.margin
     monkeypatch.setattr(_Trial, "by_chance", lambda trial, fixed: 0.9 * fixed.statistic)
     assert found.worth(wrong, position, own) == found.worth(wrong, position)

@@ -43,12 +43,15 @@ def test_friction_that_turns_over_at_another_speed_is_recovered_within_its_stand
         assert np.median(model.std / repeated) < 1.1
 
 
-@pytest.fixture(scope="module")
-def estimated(leg):
-    """Observations of a leg, its estimate by least squares, and the residuals of its periods without their mean."""
+@pytest.fixture(scope="module", params=[0.1, 3.0], ids=["told", "open"])
+def estimated(leg, request):
+    """Observations of a leg, its estimate by least squares, and the residuals of its periods without their mean.
+
+    With little noise the data tell how friction turns over, with much they leave it open.
+    """
     effects = base_effects(leg)
     truth = truth_of(leg, leg_series(), samples=500)
-    processed = process(record(leg, truth, 10, torque_noise=0.1), leg, period=10.0)
+    processed = process(record(leg, truth, 10, torque_noise=request.param), leg, period=10.0)
     observations = Observations(leg, effects, find_base_parameters(leg, effects), processed)
     estimate = LeastSquares().estimate(observations)
     residuals = observations.period_residuals(estimate.values)

@@ -104,3 +104,16 @@ def test_what_the_model_lacks_widens_the_intervals(leg, truth):
     alone = np.sqrt(np.diag(bad.uncertainty.repeatability))
     assert np.abs((bad.values - exact) / alone).max() > 10.0
     assert np.mean(np.abs(bad.values - exact) <= bad.uncertainty.half_width()) > 0.5
+
+
+def test_what_is_left_counts_though_it_is_too_little_to_be_told(leg, truth):
+    """A ripple of less than the noise of the mean: no warning, and wider intervals where it moves the estimate."""
+    recording = record(leg, truth, 10, torque_noise=0.4)
+    ripple = 0.07 * np.sin(7.0 * recording.columns["theta_hip"])
+    bent = recording.replace_columns({"tau_motor_hip": recording.columns["tau_motor_hip"] + ripple})
+    plain, more = (identify(leg, each, period=10.0, estimator=LeastSquares()) for each in (recording, bent))
+    assert plain.covariance_kind is more.covariance_kind is CovarianceKind.PERIODS
+    assert not any("the model lacks something" in text for text in more.warnings)
+    np.testing.assert_allclose(more.uncertainty.repeatability, plain.uncertainty.repeatability, rtol=0.01)
+    hip = [name.startswith(("hip.", "thigh.")) for name in more.names]
+    assert np.max((more.std / plain.std)[hip]) > 1.1
