@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 import sea_ident
-from sea_ident.discrepancy.assess import _size_for, detectability, no_worse, rivals
+from sea_ident.discrepancy.assess import _size_for, _without, detectability, no_worse, rivals
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import period_data, wide_processing
@@ -131,6 +131,35 @@ def test_a_spring_that_stiffens_by_any_power_is_declared_beside_one_with_two_sid
     stiffening = next(a for a in found if (a.effect, a.joint) == ("spring_stiffening", "hip"))
     assert stiffening.fit.effects[-1].exponent == pytest.approx(1.9, abs=0.05)
     assert stiffening.fit.statistic == pytest.approx(final.fit.statistic, rel=1e-3)
+
+
+@pytest.mark.scenario
+def test_what_others_could_take_up_is_looked_for_without_what_they_hold_of_it(laboratory, rippled):
+    """A play that never closes beside a slip that was found with it: its size is open, the slip hides what it is."""
+    planted = [
+        ("encoder_offset", "hip", [], {"offset": 0.002}),
+        ("spring_hysteresis", "hip", [0.0, 0.07], {"slip": 0.004}),
+    ]
+    bench = laboratory.bench(laboratory.record(planted, periods=8))
+    start, first = settle(bench, bench.effects), len(bench.effects)
+    added = make_effect("backlash", "hip", half_width=0.0013), make_effect("spring_hysteresis", "hip", slip=0.004)
+    model = (*start.fit.effects, *added)
+    now = settle_again(bench, bench.refine(model, start.noise, start=start.fit.parameters, only=first))
+    held, found = (how(bench, now, first) for how in (held_without, _without))
+    assert found.statistic < held.statistic - 1e3
+    assert found.effects[-1].slip != now.fit.effects[-1].slip
+    (other,) = rivals(bench, Selection(start, now, 2, (1e-9, 1e-9)))[first]
+    assert (other.effect, other.fit.effects[first].offset) == ("encoder_offset", pytest.approx(0.002, rel=0.05))
+    # an effect whose size is known is told by what is left as it is
+    bench, _, now = rippled
+    last = len(now.fit.effects) - 1
+    assert _without(bench, now, last).statistic == held_without(bench, now, last).statistic
+
+
+def held_without(bench, now, position):
+    """The model without an effect, the shapes of all others held."""
+    others = [effect for k, effect in enumerate(now.fit.effects) if k != position]
+    return bench.fit(others, now.noise, start=now.fit.parameters)
 
 
 @pytest.mark.scenario
