@@ -123,9 +123,9 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
 
 
 def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray, str]:
-    """Covariance from the part of the mean residual that repeats in every period, so is no noise.
+    """Covariance from the part of the mean residual that repeats in every period, so is no noise, and of what is held.
 
-    It is treated as a random error with the correlation that the residual shows along the period: that is what an
+    That part is treated as a random error with the correlation that the residual shows along the period: that is what an
     interval can say of a model error that nobody has named. Only what moves the estimate counts. So does what is too
     little to be sure of: friction turns over otherwise than modelled by a tenth of the noise, and gathers in the
     parameters of that friction.
