@@ -116,29 +116,37 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
         covariance, freedom, drifted = _with_drift(*_from_blocks(observations, estimate, residuals), influences)
         kind = CovarianceKind.BLOCKS
     found = (*drifted, *_disagreement(observations, estimate, covariance))
-    misfit, text = _misfit(observations, estimate, residuals)
-    if text:
-        kind, found = CovarianceKind.REMAINDER, (*found, text)
-    return Uncertainty(covariance + misfit, freedom, kind, influences, covariance, found)
-
-
-def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArray) -> tuple[FloatArray, str]:
-    """Covariance from the part of the mean residual that repeats in every period, so is no noise, and of what is held.
-
-    That part is treated as a random error with the correlation that the residual shows along the period: that is what an
-    interval can say of a model error that nobody has named. Only what moves the estimate counts. So does what is too
-    little to be sure of: friction turns over otherwise than modelled by a tenth of the noise, and gathers in the
-    parameters of that friction.
-
-    Returns:
-        (b, b) covariance, and in words what lacks; empty where no more is left than may be noise.
-    """
     mean = observations.residual(estimate.values)
     if estimate.period_torque is not None:
         mean = mean + estimate.period_torque.mean(axis=0) - observations.torque
     if estimate.band is not None:
         mean = estimate.band.part_of(mean)
         residuals = np.stack([estimate.band.part_of(own) for own in residuals])
+    misfit, text = _misfit(observations, estimate, mean, residuals)
+    if text:
+        kind, found = CovarianceKind.REMAINDER, (*found, text)
+    rest = misfit + turning_covariance(observations, estimate, mean, residuals)
+    return Uncertainty(covariance + rest, freedom, kind, influences, covariance, found)
+
+
+def _misfit(
+    observations: Observations, estimate: Estimate, mean: FloatArray, residuals: FloatArray
+) -> tuple[FloatArray, str]:
+    """Covariance from the part of the mean residual that repeats in every period, so is no noise.
+
+    It is treated as a random error with the correlation that the residual shows along the period: that is what an
+    interval can say of a model error that nobody has named. Only what moves the estimate counts. So does what is too
+    little to be sure of: where it gathers in a few parameters, a tenth of the noise is much for them.
+
+    Args:
+        observations: the data.
+        estimate: what was estimated from them.
+        mean: (N, n) residual of the mean, within the band of the estimate.
+        residuals: (P, N, n) those of the periods, their mean taken off.
+
+    Returns:
+        (b, b) covariance, and in words what lacks; empty where no more is left than may be noise.
+    """
     periods = len(residuals)
     noise = (residuals**2).sum(axis=0) / (periods * (periods - 1.0))
     noise_energy, energy = (estimate.weights * noise).sum(axis=0), (estimate.weights * mean**2).sum(axis=0)
@@ -146,7 +154,6 @@ def _misfit(observations: Observations, estimate: Estimate, residuals: FloatArra
     if noise_energy.max() <= 0.0:
         return np.zeros((len(estimate.values),) * 2), ""
     covariance = _scores(observations, estimate, mean * np.sqrt(1.0 - 1.0 / np.maximum(ratio, 1.0)))
-    covariance += turning_covariance(observations, estimate, mean, residuals)
     large = ratio > MISFIT
     if not np.any(large):
         return covariance, ""
