@@ -3,7 +3,13 @@ import pytest
 
 from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.effects import base_effects, make_effect
-from sea_ident.estimation import identify, identify_measured_springs, identify_one_shot, identify_springs
+from sea_ident.estimation import (
+    CovarianceKind,
+    identify,
+    identify_measured_springs,
+    identify_one_shot,
+    identify_springs,
+)
 from sea_ident.estimation.spring_result import Verdict
 from sea_ident.estimation.spring_verdict import hysteresis_column, verdict_of
 from sea_ident.exceptions import IdentificationError, RecordingError, RobotError, SeaIdentWarning
@@ -87,6 +93,16 @@ def test_one_shot_is_sharper_and_as_honest(leg, coarse):
         gain.append(np.concatenate([two.std / one.std, (found(two)[1] / std).ravel()]))
     assert np.sqrt(np.mean(np.square(z))) < 1.4  # 1.13 for Student's distribution with nine degrees of freedom
     assert np.median(np.mean(gain, axis=0)) > 1.5
+
+
+def test_one_shot_counts_what_is_left_and_says_that_something_lacks_only_where_it_does(leg, coarse):
+    recording = record(leg, coarse, 10, **NOISE)
+    ripple = 0.5 * np.sin(7.0 * recording.columns["theta_hip"])
+    bent = recording.replace_columns({"tau_motor_hip": recording.columns["tau_motor_hip"] + ripple})
+    for each, kind in ((recording, CovarianceKind.PERIODS), (bent, CovarianceKind.REMAINDER)):
+        told = identify_one_shot(leg, each, period=10.0).uncertainty
+        assert told.kind is kind
+        assert np.any(told.covariance != told.repeatability)
 
 
 def test_one_shot_needs_springs_and_periods(leg, truth):

@@ -35,9 +35,9 @@ def identified(root: Path, rows: Collection[str] = ()) -> Iterator[str]:
             continue
         folder, truth = case_folder(root, case.label), truth_of(case)
         about, annotation = json.loads((folder / "joints.json").read_text()), folder / "annotation.urdf"
-        robot = load_robot(folder / "robot.urdf", annotation if annotation.exists() else None, about["joints"])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeaIdentWarning)
+            robot = load_robot(folder / "robot.urdf", annotation if annotation.exists() else None, about["joints"])
             model = identify(robot, read_recording(folder / "train.npz"), period=about["period"])
         if not case.planted:
             off = _errors(model, truth)
