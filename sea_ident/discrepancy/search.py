@@ -26,6 +26,7 @@ from sea_ident.discrepancy.next_effect import (
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again
+from sea_ident.discrepancy.slips import by_their_first_elements
 from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
@@ -151,6 +152,7 @@ def search(
             break
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
+    now = by_their_first_elements(bench, now, len(now.fit.effects) - len(added))
     return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
 
 

@@ -1,0 +1,60 @@
+"""Dry friction in a spring told by its first element.
+
+On a motion that hardly bends a spring three times as far as its friction slips, only one element is seen to slip. It
+may as well be the first as the second one of friction that slips at a third of that: the torque is the same, but the
+numbers of the latter are those of no friction that is there.
+"""
+
+from dataclasses import replace
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.noise import NoiseFloor
+from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects.spring_hysteresis import WIDER, SpringHysteresis
+
+NOT_SEEN = 3.0
+"""Standard deviations within which an element may be nothing."""
+
+
+def by_the_first_element(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
+    """A model with what slips in a spring told as its first element, where that one was nothing.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        noise: noise floor.
+        position: of any effect in the model.
+
+    Returns:
+        The model; the same one where its first element is something, or does not do for the second.
+    """
+    effect = fit.effects[position]
+    if not isinstance(effect, SpringHysteresis):
+        return fit
+    narrow = fit.slice_of(position, bench.counts(fit.effects)).start
+    if abs(fit.values[narrow]) > NOT_SEEN * fit.unit**0.5 * fit.std(narrow):
+        return fit
+    effects = list(fit.effects)
+    effects[position] = replace(effect, slip=WIDER * effect.slip)
+    other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
+    slack = len(bench.slack_links(other)) > len(bench.slack_links(fit))
+    return fit if slack or other.statistic - fit.statistic > EQUALLY_GOOD * fit.unit else other
+
+
+def by_their_first_elements(bench: Bench, now: Settled, first: int) -> Settled:
+    """A settled model with what slips in its springs told by first elements.
+
+    Args:
+        bench: the recording.
+        now: the model with what was found.
+        first: position of the first effect that was found.
+
+    Returns:
+        The model, settled; the same one where nothing is told otherwise.
+    """
+    fit = now.fit
+    for position in range(first, len(fit.effects)):
+        fit = by_the_first_element(bench, fit, now.noise, position)
+    return now if fit is now.fit else settle_again(bench, fit)

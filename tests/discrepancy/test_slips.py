@@ -1,0 +1,81 @@
+"""Dry friction in a spring of which a motion shows one element, told as the first one."""
+
+import numpy as np
+import pytest
+
+from sea_ident.discrepancy.search import Selection, search
+from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.slips import by_the_first_element, by_their_first_elements
+from sea_ident.effects import make_effect
+from sea_ident.effects.spring_hysteresis import WIDER
+
+SLIP, NARROW, WIDE = 0.006, 0.9, 0.6
+"""Of the knee, which bends by little more than that either way [rad], [N m], [N m]."""
+
+
+@pytest.fixture(scope="module")
+def slipping(laboratory):
+    """A leg with dry friction in the spring of its knee: bench, and the settled model without it."""
+    recording = laboratory.record([("spring_hysteresis", "knee", [NARROW, WIDE], {"slip": SLIP})], periods=10)
+    bench = laboratory.bench(recording)
+    return bench, settle(bench, bench.effects)
+
+
+def with_slip(bench, start, slip):
+    effects = (*start.fit.effects, make_effect("spring_hysteresis", "knee", slip=slip))
+    return bench.fit(effects, start.noise, start=start.fit.parameters)
+
+
+@pytest.fixture(scope="module")
+def by_the_second(slipping):
+    """The model with the friction that is there told by its second element."""
+    bench, start = slipping
+    begun = with_slip(bench, start, SLIP / WIDER)
+    return bench.refine(begun.effects, start.noise, start=begun.parameters, only=len(bench.effects))
+
+
+def test_the_motion_shows_one_element(slipping):
+    swing = 0.5 * np.ptp(slipping[0].data.motion.deflection[:, 1])
+    assert SLIP < swing < WIDER * SLIP
+
+
+def test_a_second_element_is_told_as_the_first(slipping, by_the_second):
+    bench, start = slipping
+    position = len(by_the_second.effects) - 1
+    narrow = by_the_second.slice_of(position, bench.counts(by_the_second.effects)).start
+    assert abs(by_the_second.values[narrow]) < 0.05 * NARROW
+    found = by_the_first_element(bench, by_the_second, start.noise, position)
+    slip_std = found.effects[-1].slip * found.std(len(found.columns) + len(found.free_shapes) - 1)
+    assert found.effects[-1].slip == pytest.approx(SLIP, abs=3.0 * slip_std + 1e-4 * SLIP)
+    assert found.values[narrow] == pytest.approx(NARROW, abs=3.0 * found.std(narrow))
+
+
+def test_a_first_element_that_is_there_stays(slipping):
+    bench, start = slipping
+    fit = with_slip(bench, start, SLIP)
+    assert by_the_first_element(bench, fit, start.noise, len(fit.effects) - 1) is fit
+    assert by_the_first_element(bench, fit, start.noise, 0) is fit
+    now = Settled(fit, start.noise)
+    assert by_their_first_elements(bench, now, len(bench.effects)) is now
+
+
+def test_a_second_element_stays_where_the_first_does_not_do_for_it(slipping, by_the_second, monkeypatch):
+    bench, start = slipping
+    refine = bench.refine
+
+    def worse(effects, noise, **given):
+        found = refine(effects, noise, **given)
+        bent = (*found.effects[:-1], make_effect("spring_hysteresis", "knee", slip=0.7 * SLIP))
+        return bench.fit(bent, noise, start=found.parameters)
+
+    monkeypatch.setattr(bench, "refine", worse)
+    position = len(by_the_second.effects) - 1
+    assert by_the_first_element(bench, by_the_second, start.noise, position) is by_the_second
+
+
+def test_a_search_tells_the_first_element(slipping, by_the_second):
+    bench, start = slipping
+    begun = Selection(start, Settled(by_the_second, start.noise), 1, (0.0,))
+    found = search(bench, bench.effects, begun)
+    (friction,) = (e for e in found.effects if e.name == "spring_hysteresis")
+    assert friction.slip == pytest.approx(SLIP, rel=0.02)
