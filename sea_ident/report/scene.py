@@ -143,7 +143,7 @@ def _parts(robot: Robot) -> list[Part]:
     model = robot.model
     parts = []
     for link, color, vertices, faces in shapes:
-        frame_id = model.getFrameId(link)
+        frame_id = model.getFrameId(link, pin.FrameType.BODY)
         if frame_id >= model.nframes:
             continue
         frame = model.frames[frame_id]

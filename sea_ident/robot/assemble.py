@@ -18,17 +18,19 @@ def _words(values: FloatArray) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def link_model(tree: UrdfTree) -> pin.Model:
-    """Pinocchio's model of all links, with one scalar coordinate for every joint that can move.
+def link_model(tree: UrdfTree, moving: set[str]) -> tuple[pin.Model, dict[str, float]]:
+    """Pinocchio's model of the links, with one scalar coordinate for every joint that moves.
 
     Pinocchio reads a URDF that is written here with nothing but what it needs, so that nothing else in a file, nor a
     strange name, can confuse it. Continuous joints get one angle (nq = nv); floating and planar joints are fixed.
 
     Args:
         tree: the kinematic tree.
+        moving: names of the joints that move; every other one is locked.
 
     Returns:
-        The model; its joints and frames carry the names of the URDF, its order is Pinocchio's own.
+        The model, its other links merged into those that carry them, and the position of each locked joint. Joints and
+        frames carry the names of the URDF, their order is Pinocchio's own.
 
     Raises:
         RobotError: if Pinocchio cannot use it.
@@ -60,33 +62,22 @@ def link_model(tree: UrdfTree) -> pin.Model:
         model = pin.buildModelFromXML(etree.tostring(root).decode())
     except Exception as error:  # Pinocchio raises several kinds; all mean that it could not use the file
         raise RobotError(f"{tree.file}: Pinocchio cannot use it: {error}") from None
-    model.name = tree.name
+    # joints are locked under the plain names: those of the URDF may be a joint's and a link's at once
     real = {short: name for names in (links, joints) for name, short in names.items()}
+    held = [k for k in range(1, model.njoints) if real[model.names[k]] not in moving]
+    locked = {real[model.names[k]]: locked_position(tree, real[model.names[k]]) for k in held}
+    reference = np.zeros(model.nq)
+    for k in held:
+        reference[model.joints[k].idx_q] = locked[real[model.names[k]]]
+    if held:
+        model = pin.buildReducedModel(model, held, reference)
+    model.name = tree.name
     for k in range(1, model.njoints):
         model.names[k] = real[model.names[k]]
     for frame in model.frames:
         frame.name = real.get(frame.name, frame.name)
     model.armature[:] = 0.0
-    return model
-
-
-def lock_joints(full: pin.Model, tree: UrdfTree, moving: set[str]) -> tuple[pin.Model, dict[str, float]]:
-    """The model with every joint locked that does not move.
-
-    Args:
-        full: model of all links.
-        tree: the kinematic tree.
-        moving: names of the joints that move.
-
-    Returns:
-        The model, its other links merged into those that carry them, and the position of each locked joint.
-    """
-    held = [k for k in range(1, full.njoints) if full.names[k] not in moving]
-    locked = {full.names[k]: locked_position(tree, full.names[k]) for k in held}
-    reference = np.zeros(full.nq)
-    for k in held:
-        reference[full.joints[k].idx_q] = locked[full.names[k]]
-    return (pin.buildReducedModel(full, held, reference) if held else full), locked
+    return model, locked
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.arguments import as_path
 from sea_ident.exceptions import RobotError, SeaIdentWarning
 from sea_ident.robot.annotation import Annotation, parse_annotation
-from sea_ident.robot.assemble import add_rotors, link_model, lock_joints
+from sea_ident.robot.assemble import add_rotors, link_model
 from sea_ident.robot.checks import check_annotation, check_bodies, check_groups
 from sea_ident.robot.joints import moving_joints, root_master
 from sea_ident.robot.limits import Limits
@@ -74,7 +74,7 @@ def robot_from_text(
     """
     tree = parse_urdf(urdf, source)
     parsed = _annotation(tree, source, annotation, annotation_name)
-    model, locked = lock_joints(link_model(tree), tree, moving_joints(tree, joints))
+    model, locked = link_model(tree, moving_joints(tree, joints))
     joint_list = _joints(tree, model, parsed)
     limits, notes = _limits(tree, parsed, joint_list, locked)
     notes += check_bodies(tree, model) + check_annotation(tree, parsed, joint_list)

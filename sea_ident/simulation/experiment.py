@@ -90,7 +90,8 @@ def simulate(
         warm_up: temperature of the motors; not simulated by default.
         rate: samples per second [Hz]; a whole number per period is taken.
         step: longest step of the integrator [s]; a whole number per sample is taken. By default 5 ms between reversals
-            and 2.5 ms around them, down to 0.5 ms where much friction turns over quickly at a joint of little inertia.
+            and 2.5 ms around them, down to 0.5 ms where much friction turns over quickly at a joint of little inertia,
+            or where links turn fast.
         settling: when the motion counts as periodic.
         start: its first sample is the initial state, and nothing is settled; by default a Fourier series is settled,
             and a Motion starts with its own velocity and the links in static equilibrium.

@@ -33,6 +33,15 @@ def test_step_is_that_of_the_quadratic_program(seed):
     assert gain(found.step) <= gain(best) + 1e-6
 
 
+def test_a_wall_that_is_touched_stops_the_step_toward_it_alone():
+    """Its curvature is beyond all digits of the others: the step along it is exact all the same."""
+    slack = np.array([1e-10, 10.0])
+    problem = StepProblem(np.ones(2), np.eye(2), {0: DynamicTangent(np.eye(2)[None])}, [side(slack, 1e-2)], (1, 2))
+    found = problem.solve(1e-2)
+    assert abs(found.step[0]) < 2.0 * slack[0]
+    assert found.step[1] == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.0])
 def test_correction_follows_a_bent_wall(angle):
     """Along the inside of a cylinder, x^2 + y^2 <= 1: shrinking toward the middle would cost height."""

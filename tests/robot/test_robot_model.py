@@ -302,3 +302,16 @@ def test_masses_on_the_axes_of_joints_may_be_a_part_of_either_body(name: str) ->
     weight = np.array(pin.rnea(plain, plain.createData(), x, still, still))
     rows = [pin.rnea(plain, plain.createData(), x, still, each) - weight for each in np.eye(len(x))]
     np.testing.assert_allclose(mass, np.array(rows), atol=1e-9 * np.abs(mass).max())
+
+
+@pytest.mark.parametrize("moving", [None, ("arm",), ("hand",)])
+def test_a_link_may_carry_the_name_of_a_joint(moving: tuple[str, ...] | None) -> None:
+    def robot(second: str) -> Robot:
+        parts = (joint("arm", "base", "arm"), joint("hand", "arm", second, axis="1 0 0"))
+        return build(link("base"), link("arm", 2.0), link(second, 0.5), *parts, joints=moving)
+
+    twice, plain = robot("hand"), robot("other")
+    assert twice.joint_names == plain.joint_names
+    assert twice.locked == plain.locked
+    motion = random_motion(plain, 4, seed=1)
+    np.testing.assert_array_equal(inverse_dynamics(twice, motion)[0], inverse_dynamics(plain, motion)[0])

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from plants import baxter_arm, from_parts, joint, link, modest_series, motor, ur10
 
@@ -204,3 +205,38 @@ def test_gains_do_not_change_with_the_steps(leg, leg_series):
         one, other = (controller.drive(leg, reference, np.linspace(0.0, end, 7)) for end in (1.0, 3.0))
         np.testing.assert_array_equal(one.velocity_gain, other.velocity_gain)
         np.testing.assert_array_equal(one.position_gain, other.position_gain)
+
+
+def test_what_turns_fast_takes_shorter_steps(leg, leg_series):
+    plant = plant_from_robot(leg)
+    fast = replace(leg_series, a=6.0 * leg_series.a, b=6.0 * leg_series.b)
+    times = np.linspace(0.0, fast.period, 200)
+    turning = np.max(np.abs(np.cumsum(fast.motion(times).dq, axis=1)))  # all about the same axis
+    step = steps(leg, plant, SmoothCoulomb(), fast)
+    assert SHORTEST < step < LONGEST
+    assert step * turning == pytest.approx(0.034, rel=0.01)
+
+
+def test_a_fast_arm_without_friction_moves_as_its_torques_ask():
+    robot = ur10()
+    series = modest_series(robot, base_frequency=0.5, harmonics=2)
+    series = replace(series, a=6.0 * series.a, b=6.0 * series.b)
+    quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none(), "controller": ComputedTorque()}
+
+    def missing(step):
+        """Part of the torque that inverse dynamics of the positions do not give [-]."""
+        run = simulate(robot, series, periods=2, step=step, **quiet)
+        samples = len(run.motion) // 2
+        spectrum = np.fft.rfft(run.motion.q[samples:], axis=0)
+        rate = 2j * np.pi * np.arange(len(spectrum))[:, None] / series.period
+        spectrum[samples // 5 :] = 0.0
+        q, dq, ddq = (np.fft.irfft(spectrum * rate**order, samples, axis=0) for order in range(3))
+        data = robot.model.createData()
+        torque = np.array([pin.rnea(robot.model, data, *each) for each in zip(q, dq, ddq, strict=True)])
+        error = run.tau_motor[samples:] - torque
+        return run.step, float(np.max(np.std(error, axis=0) / np.std(torque, axis=0)))
+
+    (usual, left), (_, long_left) = missing(None), missing(LONGEST)
+    assert usual < LONGEST
+    assert left < 5e-5
+    assert long_left > 3.0 * left
