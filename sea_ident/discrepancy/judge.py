@@ -184,8 +184,11 @@ def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
 def penalty(effect: Effect, bench: Bench) -> float:
     """Price of the parameters of an effect in units of the statistic, so that the simpler of two equals wins.
 
-    A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one.
+    A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one. What the
+    description gives costs nothing: it was there before the recording was.
     """
+    if effect.is_described(bench.robot):
+        return 0.0
     # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points,
     # and where a kink is; its sides are straight then
     found = len(effect.shapes) if is_push(effect) else 0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.discrepancy.as_described import as_described
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key
@@ -32,7 +33,7 @@ from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
 
 MOST_EFFECTS = 6
-"""Largest number of effects that are added."""
+"""Largest number of effects that are added, beside those that the description gives."""
 
 PUSHES_BACK = 0.2
 """Share of a large push by which the torque must change without it: else it only cancels another [-]."""
@@ -123,13 +124,15 @@ def search(
         tried.update(begun.tried)
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
-        largest = _largest_changes(bench, now.fit, len(added))
-    waits, before = False, start
+    elif begun is None and not ruled_out:
+        now, added = _as_described(bench, start)
+    largest = _largest_changes(bench, now.fit, len(added))
+    waits, before, given = False, start, len(added) if begun is None else 0
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
         step = None
-        if len(added) < MOST_EFFECTS and not _lost(now, before, len(added), candidates):
+        if len(added) < MOST_EFFECTS + given and not _lost(now, before, len(added) - given, candidates):
             smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
             step = next_effect(bench, now, candidates, tests, smallest, tried)
         if step is None and waits:
@@ -154,6 +157,20 @@ def search(
     now, added = _eliminate(bench, now, added, tests)
     now = by_their_first_elements(bench, now, len(now.fit.effects) - len(added))
     return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
+
+
+def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:
+    """A model with what its description gives and it lacks, as far as it is needed, and the significance of that."""
+    now = as_described(bench, start)
+    count = len(now.fit.effects) - len(start.fit.effects)
+    now, added = _eliminate(bench, now, [0.0] * count, count, fewest=0)
+    if not added:
+        return start, []
+    if len(added) < count:
+        now = _settled(bench, now)
+    positions = range(len(now.fit.effects) - len(added), len(now.fit.effects))
+    without = side_by_side(_Elimination(bench, now, count, 0.0), positions)
+    return now, [each.p_value for each in without]
 
 
 def _lost(now: Settled, before: Settled, added: int, candidates: Sequence[Candidate]) -> bool:

@@ -1,0 +1,34 @@
+"""Friction of links that the description gives and the model does not have: the first that may be missing.
+
+It is no discovery, and at many joints at once a search for one effect after the other would lose its way: what is left
+at one joint by the friction of the next looks like whatever acts at both.
+"""
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.effects.link_friction import LinkFriction
+
+EXPLAINS = 0.5
+"""Share of the excess that they must explain together, for a search to begin with them [-]."""
+
+
+def as_described(bench: Bench, start: Settled) -> Settled:
+    """The model with all friction of links that the description gives, settled; as it was where that does not matter.
+
+    Args:
+        bench: the recording.
+        start: the model.
+    """
+    modelled = {effect.joint for effect in start.fit.effects if isinstance(effect, LinkFriction)}
+    described = [
+        effect
+        for effect in LinkFriction.instances(bench.robot)
+        if effect.joint not in modelled and effect.is_described(bench.robot)
+    ]
+    if not described or lack_of_fit(bench, start)[2] >= LACK_LEVEL:
+        return start
+    now = settle(bench, (*start.fit.effects, *described))
+    without = bench.fit(start.fit.effects, now.noise, start=start.fit.parameters, tangents=False)
+    slack = len(bench.slack_links(now.fit)) > len(bench.slack_links(start.fit))
+    return start if slack or now.fit.excess > (1.0 - EXPLAINS) * without.excess else now
