@@ -18,6 +18,8 @@ REFUSED_TYPES = ("floating", "planar", "spherical", "ball")
 # Pinocchio's reader recurses along the chain: some thousand links in a row overflow the stack.
 LONGEST_CHAIN = 1000
 MOST_LINKS = 10000
+# Converters write 1e16 where there is no limit.
+NO_LIMIT = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,12 +179,11 @@ def _joint(element: etree._Element, file: str) -> JointElement:
     inf = float("inf")
     lower, upper, velocity, effort = -inf, inf, inf, inf
     if limit is not None:
-        velocity = abs(number(limit, "velocity", inf, where, finite=False)) or inf
-        effort = abs(number(limit, "effort", inf, where, finite=False)) or inf
+        velocity = abs(_bound(limit, "velocity", inf, where)) or inf
+        effort = abs(_bound(limit, "effort", inf, where)) or inf
         if kind in ("revolute", "prismatic"):
             # URDF: an omitted bound of a limited joint is zero; both zero means that none was stated.
-            lower = number(limit, "lower", 0.0, where, finite=False)
-            upper = number(limit, "upper", 0.0, where, finite=False)
+            lower, upper = (_bound(limit, side, 0.0, where) for side in ("lower", "upper"))
             if lower > upper:
                 raise RobotError(f"{where}: lower limit {lower} is above upper limit {upper}; exchange them")
             if lower == upper == 0.0:
@@ -220,6 +221,12 @@ def _joint(element: etree._Element, file: str) -> JointElement:
         friction=friction,
         mimic=mimic,
     )
+
+
+def _bound(limit: etree._Element, attribute: str, default: float, where: str) -> float:
+    """A limit, infinite where it is one only by name."""
+    value = number(limit, attribute, default, where, finite=False)
+    return value if abs(value) < NO_LIMIT else float(np.copysign(np.inf, value))
 
 
 def parse_urdf(text: str | bytes, file: str) -> UrdfTree:

@@ -315,3 +315,10 @@ def test_a_link_may_carry_the_name_of_a_joint(moving: tuple[str, ...] | None) ->
     assert twice.locked == plain.locked
     motion = random_motion(plain, 4, seed=1)
     np.testing.assert_array_equal(inverse_dynamics(twice, motion)[0], inverse_dynamics(plain, motion)[0])
+
+
+def test_limits_that_no_robot_reaches_are_none() -> None:
+    limit = 'lower="-1e+16" upper="1e+16" velocity="1e16" effort="1e16"'
+    limits = build(link("base"), link("rotor"), joint("spin", "base", "rotor", limit=limit)).limits
+    for bound in (-limits.lower, limits.upper, limits.velocity, limits.torque):
+        assert np.all(np.isposinf(bound))
