@@ -351,6 +351,20 @@ def test_other_robots_take_turns_with_and_without_something_hidden() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.scenario
+def test_robots_that_exist_are_driven_within_their_limits() -> None:
+    for index, name in enumerate(("anymal", "icub", "centauro", "panda", "talos")):
+        case = draw_case(11, "existing", 2 * index)
+        assert case.robot == ("anymal", "centauro", "talos", "icub", "panda")[index]
+        assert not case.planted
+        robot, limits = nominal_robot(name), nominal_robot(name).limits
+        motion = draw_trajectory(name, 4.0, generator(11, index)).motion(np.linspace(0.0, 4.0, 400))
+        assert np.all((motion.q > limits.lower) & (motion.q < limits.upper))
+        assert np.all(np.abs(motion.dq) < limits.velocity)
+        assert np.all(nominal_truth(name).coulomb > 0.0)
+        assert robot.n == len(nominal_truth(name).viscous)
+
+
 def test_another_joint_is_one_of_the_same_chain() -> None:
     rng = generator(9, 11)
     torso = gap.Gauge(drawn_truth("torso", rng), draw_trajectory("torso", 4.0, rng, candidates=2),

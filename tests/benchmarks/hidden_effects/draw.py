@@ -73,6 +73,14 @@ ROWS = {
             robots=("prosthesis", "oblique_arm", "torso"),
         ),
         Row("drawn", "robots drawn from the seed, nothing or one effect", 12, LIBRARY, half=True),
+        Row(
+            "existing",
+            "robots that exist, nothing or one effect",
+            13,
+            LIBRARY,
+            half=True,
+            robots=("anymal", "icub", "centauro", "panda", "talos"),
+        ),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }

@@ -59,6 +59,29 @@ ROBOTS = {
     "torso": RobotSource(
         str(FOLDER / "torso.urdf"), viscous=(4.0, 0.0, 0.0, 0.0, 0.0), coulomb=(4.0, 0.0, 0.0, 0.0, 0.0)
     ),
+    # robots that are there, held at their bases: with the springs that they have been given here, and rigid ones
+    "anymal": RobotSource(
+        "example:anymal_b_simple_description/robots/anymal.urdf", "anymal_b_sea", ("LF_HAA", "LF_HFE", "LF_KFE")
+    ),
+    "icub": RobotSource("example:icub_description/robots/icub.urdf", "icub_sea", ("l_knee", "l_ankle_pitch")),
+    "centauro": RobotSource(
+        "example:centauro_description/urdf/centauro.urdf",
+        "centauro_sea",
+        tuple(f"j_arm1_{k}" for k in range(1, 7)),
+        acceleration=3.0,
+    ),
+    "panda": RobotSource(
+        "example:panda_description/urdf/panda.urdf",
+        joints=tuple(f"panda_joint{k}" for k in range(1, 8)),
+        viscous=(4.0, 4.0, 3.0, 3.0, 1.0, 1.0, 0.7),
+        coulomb=(4.0, 4.0, 3.0, 3.0, 1.0, 1.0, 0.7),
+    ),
+    "talos": RobotSource(
+        "example:talos_data/robots/talos_full_v2.urdf",
+        joints=tuple(f"leg_left_{k}_joint" for k in range(1, 7)),
+        viscous=(4.0, 6.0, 6.0, 6.0, 4.0, 3.0),
+        coulomb=(5.0, 8.0, 8.0, 8.0, 5.0, 3.0),
+    ),
 }
 
 
