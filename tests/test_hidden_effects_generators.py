@@ -30,7 +30,7 @@ from tests.benchmarks.hidden_effects import catalogue, forms, gap, generate, pro
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case, trajectories_of, truth_of
 from tests.benchmarks.hidden_effects.drawn_robots import MOST_JOINTS, drawn_name, drawn_robot
-from tests.benchmarks.hidden_effects.engine import Exact, Friction, simulate_mujoco
+from tests.benchmarks.hidden_effects.engine import STEP, Exact, Friction, simulate_mujoco
 from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth, nominal_robot, nominal_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
@@ -420,3 +420,11 @@ def test_what_drifts_does_so_by_the_clock_however_long_a_recording_is(monkeypatc
     assert asked[0] == asked[1]
     if engine == "mujoco":
         assert asked[0] == case.periods * case.period
+
+
+@pytest.mark.scenario
+def test_a_link_that_swings_fast_on_its_spring_is_followed() -> None:
+    truth, series = nominal_truth("centauro"), draw_trajectory("centauro", 5.0, generator(9, 12))
+    exact = simulate_mujoco(truth, series, 1, settle=0, rate=50.0)
+    again = simulate_mujoco(truth, series, 1, settle=0, rate=50.0, step=STEP / 8.0)
+    assert np.max(np.abs(exact.motion.q - again.motion.q)) < 2e-4

@@ -19,6 +19,8 @@ from tests.benchmarks.hidden_effects.mjcf import Coupling, Flexibility, Payload,
 from tests.benchmarks.hidden_effects.plants import Truth
 
 STEP = 1e-3
+FASTEST = 0.5
+"""Angle of its swing on the spring by which a link may get on in a step [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,12 @@ def reference_torque(truth: Truth, series: FourierSeries, time: FloatArray) -> t
     return theta, bodies + rotors + friction
 
 
+def _swings_within(truth: Truth) -> float:
+    """Time in which the fastest link swings by a radian on its spring [s], in the middle pose."""
+    mobility = np.diagonal(np.linalg.inv(truth.robot.mass_matrices(np.zeros(truth.robot.n))[0]))
+    return float(1.0 / np.sqrt(max(float(np.max(truth.stiffness * mobility)), 1e-300)))
+
+
 def simulate_mujoco(
     truth: Truth,
     series: FourierSeries,
@@ -120,6 +128,8 @@ def simulate_mujoco(
     friction = friction or Friction()
     if any(p.effect == "link_flexibility" for p in planted):
         step = step / 4.0  # the small body between the two springs is fast
+    elif _swings_within(truth) * FASTEST < step:
+        step = step / 4.0
     per_period = round(series.period / step)
     stride = round(1.0 / (rate * step))
     first, total = settle * per_period, (settle + periods) * per_period
