@@ -254,7 +254,7 @@ def _tested(
         selection, alternatives, held = decide(bench, confirmed.selection, alternatives, held)
         confirmed = confirmed if selection is confirmed.selection else confirmed.less(selection)
     searched = False
-    while weak := _out(held, len(trends.trends), resting(confirmed.selection, held)):
+    while weak := _out(held, len(trends.trends), _elsewhere(confirmed.selection, held, trends)):
         left = without(bench, confirmed.selection, weak)
         ruled_out = {effect_key(confirmed.selection.effects[k]) for k in weak}
         other = None if searched else _searched_beside(bench, left, ruled_out)
@@ -283,12 +283,24 @@ def _searched_beside(bench: Bench, left: Selection, ruled_out: set[Key]) -> Conf
     return found if found.selection.added > left.added else None
 
 
-def _out(held: HeldOut, drifting: int, at_rest: Collection[int]) -> list[int]:
+def _elsewhere(selection: Selection, held: HeldOut, trends: TrendTest) -> set[int]:
+    """Which of the effects that were added need not be the same on another motion.
+
+    Where dry friction in a spring rests, and what drifts: its mean is another one over every recording.
+    """
+    drifting = {k for k, e in enumerate(selection.effects) if (f"{e.name}_drift", e.joint) in trends.names}
+    return drifting | set(resting(selection, held))
+
+
+def _out(held: HeldOut, drifting: int, elsewhere: Collection[int]) -> list[int]:
     """Which effects do not hold on another motion, of those of which something is left beside as many that drift.
 
-    Where dry friction in a spring rests need not be the same there.
+    Args:
+        held: the other motion.
+        drifting: number of effects that drift.
+        elsewhere: effects that need not be the same there.
     """
-    tried = [k for k in range(len(held.transfers)) if k not in at_rest]
+    tried = [k for k in range(len(held.transfers)) if k not in elsewhere]
     weak = [k for k in tried if held.transfers[k].ruled_out]
     if len(weak) < len(tried) + drifting:
         return weak

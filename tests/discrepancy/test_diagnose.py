@@ -1,16 +1,22 @@
 """Planted effects are found, named and shown to transfer; nothing is named where nothing is missing."""
 
+import importlib
 import json
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sea_ident
 from sea_ident import side_by_side
+from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording
+
+diagnosing = importlib.import_module("sea_ident.discrepancy.diagnose")
 
 
 def recorded(laboratory, planted, seed):
@@ -222,3 +228,15 @@ def test_a_signal_that_is_50_ms_late_is_named_alone(leg, laboratory, effect):
     assert (found.effect, found.joint) == (effect, "hip")
     (delay,) = found.parameters
     assert abs(delay.value - late) < 3.0 * delay.std
+
+
+def test_the_mean_of_what_drifts_is_not_ruled_out_by_another_recording():
+    """It is another one there; what does not drift has to be the same."""
+    effects = tuple(make_effect("torque_constant", joint) for joint in ("knee", "hip"))
+    selection = SimpleNamespace(effects=effects, joints_of=lambda kind: set())
+    held = SimpleNamespace(transfers=[SimpleNamespace(ruled_out=True, share=share) for share in (-1.4, -0.5)])
+    one = np.array([0.06])
+    drift = Trend(make_effect("torque_constant_drift", "knee"), one, 0.01 * one, 100.0, 1e-9, 0.03)
+    elsewhere = diagnosing._elsewhere(selection, held, TrendTest(1e-9, (drift,), False))
+    assert elsewhere == {0}
+    assert diagnosing._out(held, 1, elsewhere) == [1]
