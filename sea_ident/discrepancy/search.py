@@ -124,15 +124,16 @@ def search(
         tried.update(begun.tried)
         now, added = settle_again(bench, begun.final.fit), list(begun.p_values)
         now = _improved(bench, now, len(added), tried, ruled_out)
-    elif begun is None and not ruled_out:
+    elif not ruled_out:
         now, added = _as_described(bench, start)
     largest = _largest_changes(bench, now.fit, len(added))
-    waits, before, given = False, start, len(added) if begun is None else 0
+    waits, before = False, start
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
         step = None
-        if len(added) < MOST_EFFECTS + given and not _lost(now, before, len(added) - given, candidates):
+        sought = len(added) - _described(bench, now, len(added))
+        if sought < MOST_EFFECTS and not _lost(now, before, sought, candidates):
             smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
             step = next_effect(bench, now, candidates, tests, smallest, tried)
         if step is None and waits:
@@ -157,6 +158,12 @@ def search(
     now, added = _eliminate(bench, now, added, tests)
     now = by_their_first_elements(bench, now, len(now.fit.effects) - len(added))
     return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
+
+
+def _described(bench: Bench, now: Settled, added: int) -> int:
+    """How many of the last effects of a model the description gives: they were not looked for."""
+    effects = now.fit.effects
+    return sum(effect.is_described(bench.robot) for effect in effects[len(effects) - added :])
 
 
 def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:

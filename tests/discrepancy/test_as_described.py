@@ -1,5 +1,7 @@
 """Friction of links that the description gives and the model lacks is tried first, at all joints at once."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import Laboratory
@@ -99,6 +101,9 @@ def test_the_friction_that_is_described_takes_no_place_from_others(described, mo
     selection = search(bench, bench.effects)
     friction = {("link_friction", joint) for joint in JOINTS}
     assert found_in(selection) == friction | {("torque_ripple", "hip")}
+    # nor where a search goes on from it
+    only = replace(selection, final=as_described(bench, selection.start), added=3, p_values=3 * (0.0,))
+    assert found_in(search(bench, bench.effects, only)) == found_in(selection)
 
 
 def test_what_is_described_has_no_price(described, laboratory):
