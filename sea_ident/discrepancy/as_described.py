@@ -5,6 +5,7 @@ at one joint by the friction of the next looks like whatever acts at both.
 """
 
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.judge import is_given
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects.link_friction import LinkFriction
@@ -19,12 +20,15 @@ def as_described(bench: Bench, start: Settled) -> Settled:
     Args:
         bench: the recording.
         start: the model.
+
+    Returns:
+        The model; `start` itself where nothing is described, or explains too little.
     """
     modelled = {effect.joint for effect in start.fit.effects if isinstance(effect, LinkFriction)}
     described = [
         effect
         for effect in LinkFriction.instances(bench.robot)
-        if effect.joint not in modelled and effect.is_described(bench.robot)
+        if effect.joint not in modelled and is_given(effect, bench.robot)
     ]
     if not described or lack_of_fit(bench, start)[2] >= LACK_LEVEL:
         return start

@@ -18,9 +18,11 @@ from sea_ident.effects import Effect, Shape
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.backlash import Backlash
 from sea_ident.effects.external_force import ExternalForce
+from sea_ident.effects.link_friction import LinkFriction
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.presliding_friction import PreslidingFriction
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.robot import Robot
 
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
@@ -181,13 +183,18 @@ def torque_change(bench: Bench, before: Fit, after: Fit) -> float:
     return float(np.max(torque_changes(bench, before, after)))
 
 
+def is_given(effect: Effect, robot: Robot) -> bool:
+    """Whether the description of a robot gives an effect that no model has by itself."""
+    return isinstance(effect, LinkFriction) and effect.is_described(robot)
+
+
 def penalty(effect: Effect, bench: Bench) -> float:
     """Price of the parameters of an effect in units of the statistic, so that the simpler of two equals wins.
 
     A wave that is as long as any costs the odds of a thousand more: what is a constant is to be called one. What the
     description gives costs nothing: it was there before the recording was.
     """
-    if effect.is_described(bench.robot):
+    if is_given(effect, bench.robot):
         return 0.0
     # when a push begins and ends is found too, though not by refinement, and so is the centre of mass among all points,
     # and where a kink is; its sides are straight then

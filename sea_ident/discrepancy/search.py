@@ -13,7 +13,15 @@ from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
-from sea_ident.discrepancy.judge import at_a_bound, is_push, own_torque, significance, torque_change, torque_changes
+from sea_ident.discrepancy.judge import (
+    at_a_bound,
+    is_given,
+    is_push,
+    own_torque,
+    significance,
+    torque_change,
+    torque_changes,
+)
 from sea_ident.discrepancy.kinks import with_their_kinks
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import (
@@ -163,7 +171,7 @@ def search(
 def _described(bench: Bench, now: Settled, added: int) -> int:
     """How many of the last effects of a model the description gives: they were not looked for."""
     effects = now.fit.effects
-    return sum(effect.is_described(bench.robot) for effect in effects[len(effects) - added :])
+    return sum(is_given(effect, bench.robot) for effect in effects[len(effects) - added :])
 
 
 def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:

@@ -135,10 +135,6 @@ class Effect(ABC):
         """(k,) values that the robot's description gives to its parameters, NaN where it gives none."""
         return np.full(len(self.columns(robot)), np.nan)
 
-    def is_described(self, robot: Robot) -> bool:
-        """Whether the description of a robot gives a number for it that is not zero."""
-        return bool(np.any(np.nan_to_num(self.prior(robot))))
-
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """How it acts in a simulation.
 

@@ -50,3 +50,7 @@ class LinkFriction(JointEffect):
         joint = robot.joints[robot.index(self.required_joint)]
         values = (joint.damping, joint.friction)
         return np.array([np.nan if value is None else value for value in values])
+
+    def is_described(self, robot: Robot) -> bool:
+        """Whether the URDF gives any."""
+        return bool(np.any(np.nan_to_num(self.prior(robot))))
