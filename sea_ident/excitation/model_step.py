@@ -100,7 +100,7 @@ class StepProblem:
             pushed -= tangent.pull(np.sum(push, axis=0))
             walled += tangent.curvature(np.sum(stiffness, axis=0))
         # near a wall its curvature is beyond all others; a step that ends inside is all that is asked of it
-        factor = scipy.linalg.cho_factor(walled, lower=True, overwrite_a=True, check_finite=False)
+        factor = scipy.linalg.cho_factor(walled, overwrite_a=True, check_finite=False)
         change = scipy.linalg.cho_solve(factor, pushed, check_finite=False)
         moved = {k: tangent.push(change.reshape(self.shape)) for k, tangent in self.tangents.items()}
         closings = {j: side.sign * moved[side.wall] for j, side in enumerate(self.sides) if side.wall in self.tangents}
