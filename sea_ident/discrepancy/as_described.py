@@ -32,11 +32,10 @@ def as_described(bench: Bench, start: Settled) -> Settled:
     ]
     if not described or lack_of_fit(bench, start)[2] >= LACK_LEVEL:
         return start
-    # a look at it in the floor of the model as it was is nothing beside settling it
+    # in the floor of the model as it was: what is not needed after all is taken out where it is settled
     quick = bench.fit((*start.fit.effects, *described), start.noise, start=start.fit.parameters, tangents=False)
     if quick.excess > (1.0 - EXPLAINS) * start.fit.excess:
         return start
     now = settle(bench, (*start.fit.effects, *described))
-    without = bench.fit(start.fit.effects, now.noise, start=start.fit.parameters, tangents=False)
     slack = len(bench.slack_links(now.fit)) > len(bench.slack_links(start.fit))
-    return start if slack or now.fit.excess > (1.0 - EXPLAINS) * without.excess else now
+    return start if slack else now

@@ -179,10 +179,6 @@ def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:
     now = as_described(bench, start)
     count = len(now.fit.effects) - len(start.fit.effects)
     now, added = _eliminate(bench, now, [0.0] * count, count, fewest=0)
-    if not added:
-        return start, []
-    if len(added) < count:
-        now = _settled(bench, now)
     positions = range(len(now.fit.effects) - len(added), len(now.fit.effects))
     without = side_by_side(_Elimination(bench, now, count, 0.0), positions)
     return now, [each.p_value for each in without]

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import Laboratory
 
 import sea_ident
 from sea_ident.discrepancy import search as searching
@@ -19,9 +18,9 @@ JOINTS = ("hip", "knee", "ankle")
 
 
 @pytest.fixture(scope="module")
-def described(series):
+def described(laboratory):
     """A leg of which the description gives friction of every link."""
-    return Laboratory(sea_ident.load_robot("exo_leg_link_friction"), tuple(series))
+    return replace(laboratory, leg=sea_ident.load_robot("exo_leg_link_friction"))
 
 
 @pytest.fixture(scope="module")
@@ -31,15 +30,15 @@ def rubbing(described):
     return bench, settle(bench, bench.effects)
 
 
-def with_friction_at(described, *joints):
-    """Bench and settled model of a leg with no other friction of links than at these joints."""
+def with_friction_at(described, *joints, share=1.0, planted=()):
+    """Bench and settled model of a leg with no other friction of links than a share of it at these joints."""
     plant = plant_from_robot(described.leg)
-    there = np.isin(described.leg.joint_names, joints)
+    there = share * np.isin(described.leg.joint_names, joints)
     plant = plant.replace(
         link_viscous_friction=plant.link_viscous_friction * there,
         link_coulomb_friction=plant.link_coulomb_friction * there,
     )
-    bench = described.bench(described.record(plant=plant))
+    bench = described.bench(described.record(planted, plant=plant))
     return bench, settle(bench, bench.effects)
 
 
@@ -58,18 +57,32 @@ def test_friction_is_told_at_all_joints_at_once(rubbing):
             assert fit.values[k] == pytest.approx(value, abs=4.0 * fit.std(k) + 0.005 * value)
 
 
-def test_a_search_names_it_and_nothing_else(rubbing):
+def test_a_search_names_it_and_nothing_else(rubbing, monkeypatch):
     bench, start = rubbing
+    monkeypatch.setattr(searching, "next_effect", lambda *given: None)  # it is no discovery
     selection = search(bench, bench.effects, start=start)
     assert found_in(selection) == {("link_friction", joint) for joint in JOINTS}
     assert len(selection.p_values) == 3
     assert max(selection.p_values) < 1e-9
 
 
-def test_what_a_description_gives_and_no_link_has_is_not_told(described):
+def test_what_a_description_gives_and_no_link_has_is_not_told(described, monkeypatch):
     bench, start = with_friction_at(described)
+    monkeypatch.setattr(bench, "fit", None)  # nothing is missing, nothing is tried
     assert as_described(bench, start) is start
     assert _as_described(bench, start) == (start, [])
+
+
+def test_what_explains_little_is_not_where_a_search_begins(described):
+    bench, start = with_friction_at(described, planted=[("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})])
+    assert as_described(bench, start) is start
+
+
+def test_what_the_model_has_is_not_added_again(described, rubbing):
+    bench = described.bench(described.record(), (*described.effects, make_effect("link_friction", "hip")))
+    now = as_described(bench, settle(bench, bench.effects))
+    found = [effect.joint for effect in now.fit.effects if effect.name == "link_friction"]
+    assert sorted(found) == sorted(JOINTS)
 
 
 def test_friction_stays_where_it_is_needed(described):
@@ -79,6 +92,12 @@ def test_friction_stays_where_it_is_needed(described):
     assert len(p_values) == 1
     assert p_values[0] < 1e-9
     assert now.fit.statistic < 1.3 * now.fit.dof
+
+
+def test_how_sure_it_is_follows_from_the_recording(described):
+    bench, start = with_friction_at(described, "knee", share=0.006)
+    _, (p_value,) = _as_described(bench, start)
+    assert 0.0 < p_value < 1e-20
 
 
 def test_a_model_that_has_it_is_as_it_was(described, rubbing):

@@ -50,13 +50,21 @@ def test_a_second_element_is_told_as_the_first(slipping, by_the_second):
     assert found.values[narrow] == pytest.approx(NARROW, abs=3.0 * found.std(narrow))
 
 
-def test_a_first_element_that_is_there_stays(slipping):
+def test_a_first_element_that_is_there_stays(slipping, monkeypatch):
     bench, start = slipping
     fit = with_slip(bench, start, SLIP)
+    monkeypatch.setattr(bench, "refine", None)  # nothing is tried
     assert by_the_first_element(bench, fit, start.noise, len(fit.effects) - 1) is fit
-    assert by_the_first_element(bench, fit, start.noise, 0) is fit
     now = Settled(fit, start.noise)
     assert by_their_first_elements(bench, now, len(bench.effects)) is now
+
+
+def test_nothing_but_friction_in_a_spring_is_told_otherwise(slipping):
+    bench, start = slipping
+    nothing = (*start.fit.effects, make_effect("torque_offset", "hip"))
+    fit = bench.fit(nothing, start.noise, start=start.fit.parameters)
+    for position in range(len(nothing)):
+        assert by_the_first_element(bench, fit, start.noise, position) is fit
 
 
 def test_a_second_element_stays_where_the_first_does_not_do_for_it(slipping, by_the_second, monkeypatch):

@@ -1,6 +1,7 @@
 """The scene of the viewer: triangles in the right place."""
 
 import base64
+import warnings
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +11,7 @@ from scipy.spatial import Delaunay
 
 from sea_ident import load_robot
 from sea_ident.exceptions import RobotError, SeaIdentWarning
-from sea_ident.report.scene import MOST_FACES, MOST_FRAMES, build_scene, simplify
+from sea_ident.report.scene import MOST_FACES, MOST_FRAMES, _parts, build_scene, simplify
 from sea_ident.robot import robot_from_text
 from sea_ident.robot.geometry import read_geometry
 
@@ -141,3 +142,15 @@ def test_sticks_hang_together_at_branches_and_slides():
             inside = place[:, :3].T @ (scene.poses[k, body, :, 3] - place[:, 3])
             hulls = [Delaunay(part.vertices) for part in scene.parts if part.body == parent]
             assert any(hull.find_simplex(inside, tol=1e-6) >= 0 for hull in hulls), (k, body)
+
+
+def test_a_link_that_carries_the_name_of_a_joint_is_drawn():
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    box = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+    links = f'<link name="base"/><link name="arm">{inertial}{box}</link>'
+    joint = '<joint name="arm" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint>'
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        robot = robot_from_text(f'<robot name="twice">{links}{joint}</robot>', "twice.urdf")
+    (part,) = (part for part in _parts(robot) if part.body == 0)
+    assert np.ptp(part.vertices, axis=0) == pytest.approx([0.1, 0.2, 0.3])
