@@ -5,10 +5,9 @@ at one joint by the friction of the next looks like whatever acts at both.
 """
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.judge import is_given
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.settle import Settled, settle
-from sea_ident.effects.link_friction import LinkFriction
+from sea_ident.effects.link_friction import left_out
 
 EXPLAINS = 0.5
 """Share of the excess that they must explain together, for a search to begin with them [-]."""
@@ -24,12 +23,7 @@ def as_described(bench: Bench, start: Settled) -> Settled:
     Returns:
         The model; `start` itself where nothing is described, or explains too little.
     """
-    modelled = {effect.joint for effect in start.fit.effects if isinstance(effect, LinkFriction)}
-    described = [
-        effect
-        for effect in LinkFriction.instances(bench.robot)
-        if effect.joint not in modelled and is_given(effect, bench.robot)
-    ]
+    described = left_out(bench.robot, start.fit.effects)
     if not described or lack_of_fit(bench, start)[2] >= LACK_LEVEL:
         return start
     # in the floor of the model as it was: what is not needed after all is taken out where it is settled

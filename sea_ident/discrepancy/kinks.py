@@ -12,7 +12,6 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects.asymmetric_spring import KINKS, AsymmetricSpring
 
 REACH = float(np.max(np.diff(KINKS)))
@@ -57,20 +56,3 @@ def at_its_kink(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit
         return fit
     better = with_kink(float(found.x))
     return bench.refine(better.effects, noise, start=better.parameters, only=len(bench.effects))
-
-
-def with_their_kinks(bench: Bench, now: Settled, first: int) -> Settled:
-    """A settled model with the kinks of its springs where they explain most.
-
-    Args:
-        bench: the recording.
-        now: the model with what was found.
-        first: position of the first effect that was found.
-
-    Returns:
-        The model, settled; the same one where nothing moved.
-    """
-    fit = now.fit
-    for position in range(first, len(fit.effects)):
-        fit = at_its_kink(bench, fit, now.noise, position)
-    return now if fit is now.fit else settle_again(bench, fit)

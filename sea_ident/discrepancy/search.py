@@ -22,7 +22,7 @@ from sea_ident.discrepancy.judge import (
     torque_change,
     torque_changes,
 )
-from sea_ident.discrepancy.kinks import with_their_kinks
+from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import (
     BESIDE_ANOTHER,
@@ -34,8 +34,8 @@ from sea_ident.discrepancy.next_effect import (
 )
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.powers import with_their_powers
-from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again
-from sea_ident.discrepancy.slips import by_their_first_elements
+from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again, settled_in_form
+from sea_ident.discrepancy.slips import by_the_first_element
 from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
@@ -164,7 +164,7 @@ def search(
             break
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
-    now = by_their_first_elements(bench, now, len(now.fit.effects) - len(added))
+    now = settled_in_form(bench, now, len(now.fit.effects) - len(added), by_the_first_element)
     return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
 
 
@@ -211,7 +211,7 @@ def _formed(bench: Bench, now: Settled) -> Settled:
     """Pushes with their edges and springs with their kinks where they belong, saturation by the power that it needs."""
     first = len(bench.effects)
     sharp = sharpened(bench, now.fit, now.noise, first)
-    now = with_their_kinks(bench, now if sharp is now.fit else settle_again(bench, sharp), first)
+    now = settled_in_form(bench, now if sharp is now.fit else settle_again(bench, sharp), first, at_its_kink)
     return with_their_powers(bench, now, first)
 
 

@@ -1,6 +1,6 @@
 """A model in the noise floor that belongs to it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,26 @@ def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Set
         if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
             return Settled(straight, noise)
     return Settled(bent, noise)
+
+
+def settled_in_form(
+    bench: Bench, now: Settled, first: int, formed: Callable[[Bench, Fit, NoiseFloor, int], Fit]
+) -> Settled:
+    """A settled model whose effects have the form that a function gives each of them.
+
+    Args:
+        bench: the recording.
+        now: the model.
+        first: position of the first effect that may change.
+        formed: gives a fit the form of its effect at a position; the fit itself where that has it.
+
+    Returns:
+        The model, settled; the same one where all have their form.
+    """
+    fit = now.fit
+    for position in range(first, len(fit.effects)):
+        fit = formed(bench, fit, now.noise, position)
+    return now if fit is now.fit else settle_again(bench, fit)
 
 
 def anchored_in_itself(bench: Bench, now: Settled) -> Settled:

@@ -11,7 +11,6 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects.spring_hysteresis import WIDER, SpringHysteresis
 
 NOT_SEEN = 3.0
@@ -41,20 +40,3 @@ def by_the_first_element(bench: Bench, fit: Fit, noise: NoiseFloor, position: in
     other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
     slack = len(bench.slack_links(other)) > len(bench.slack_links(fit))
     return fit if slack or other.statistic - fit.statistic > EQUALLY_GOOD * fit.unit else other
-
-
-def by_their_first_elements(bench: Bench, now: Settled, first: int) -> Settled:
-    """A settled model with what slips in its springs told by first elements.
-
-    Args:
-        bench: the recording.
-        now: the model with what was found.
-        first: position of the first effect that was found.
-
-    Returns:
-        The model, settled; the same one where nothing is told otherwise.
-    """
-    fit = now.fit
-    for position in range(first, len(fit.effects)):
-        fit = by_the_first_element(bench, fit, now.noise, position)
-    return now if fit is now.fit else settle_again(bench, fit)

@@ -1,5 +1,6 @@
 """Friction of the link side of an elastic joint: in its bearing, its cables, its seals."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -54,3 +55,10 @@ class LinkFriction(JointEffect):
     def is_described(self, robot: Robot) -> bool:
         """Whether the URDF gives any."""
         return bool(np.any(np.nan_to_num(self.prior(robot))))
+
+
+def left_out(robot: Robot, effects: Sequence[Effect]) -> tuple[LinkFriction, ...]:
+    """Friction of links that the description of a robot gives and a model does not have."""
+    modelled = {effect.joint for effect in effects if isinstance(effect, LinkFriction)}
+    every = (LinkFriction(joint=joint.name) for joint in robot.joints if joint.elastic)
+    return tuple(one for one in every if one.joint not in modelled and one.is_described(robot))

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from sea_ident.effects import Effect, JointEffect
+from sea_ident.effects import Effect
+from sea_ident.effects.link_friction import left_out
 from sea_ident.estimation.spring_result import SpringResult
 from sea_ident.robot import Robot
 
@@ -18,11 +19,11 @@ def described_friction(robot: Robot, effects: Sequence[Effect], springs: Sequenc
     Returns:
         One sentence, or none.
     """
-    modelled = {e.joint for e in effects if isinstance(e, JointEffect) and e.name == "link_friction"}
+    lacking = {friction.joint for friction in left_out(robot, effects)}
     found = []
     for spring in springs:
         joint = robot.joints[robot.index(spring.joint)]
-        if spring.joint not in modelled and spring.doubt() is not None and (joint.damping or joint.friction):
+        if spring.joint in lacking and spring.doubt() is not None:
             found.append(f"{spring.joint} (damping {joint.damping or 0.0:g}, friction {joint.friction or 0.0:g})")
     if not found:
         return []

@@ -279,9 +279,7 @@ def _solve(rows: FloatArray, conditions: FloatArray, inequalities: int, start: _
         places = np.arange(len(variables))[multipliers_at]
         hessian[places, places] += barrier / variables[multipliers_at] ** 2
         hessian[np.diag_indices_from(hessian)] += 1e-12 * np.trace(hessian) / len(hessian)
-        step = -scipy.linalg.cho_solve(
-            scipy.linalg.cho_factor(hessian, check_finite=False), gradient, check_finite=False
-        )
+        step = -scipy.linalg.solve(hessian, gradient, assume_a="pos", check_finite=False)
         decrement = float(-gradient @ step)
         length = _feasible_length(variables, step, table, slack, places, p, size)
         variables = variables + length * step

@@ -26,8 +26,8 @@ Positions of legs and of arms are then within 1e-5 rad of those with steps of a 
 The first stage of a much longer step does not see how steep friction is going to be where a joint reverses."""
 
 FARTHEST_TURN = 0.034
-"""Angle by which a link may turn in a step [rad]: where one turns by twice as much, torques are off by a thousandth of
-themselves, which a good recording shows."""
+"""Angle by which a link may turn in a step [rad]: where one turns by twice as much, torques are off by one or two
+thousandths of themselves, which a good recording shows."""
 
 PLACES = 16
 """Configurations along the reference at which the inertia is looked at, ..."""

@@ -7,10 +7,10 @@ import pytest
 
 from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.judge import penalty
-from sea_ident.discrepancy.kinks import at_its_kink, with_their_kinks
+from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import _formed, search
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.settle import Settled, settle, settled_in_form
 from sea_ident.effects import make_effect
 
 KINK, STIFFER = 0.009, 30.0
@@ -64,7 +64,7 @@ def test_a_kink_that_is_right_stays(kinked):
     bench, start = kinked
     fit = beginning(bench, start, kink=KINK)
     now = Settled(at_its_kink(bench, fit, start.noise, len(fit.effects) - 1), start.noise)
-    assert with_their_kinks(bench, now, len(bench.effects)) is now
+    assert settled_in_form(bench, now, len(bench.effects), at_its_kink) is now
 
 
 def test_a_kink_has_a_price_and_both_its_sides_are_straight(kinked):

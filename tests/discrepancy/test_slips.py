@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.search import Selection, search
-from sea_ident.discrepancy.settle import Settled, settle
-from sea_ident.discrepancy.slips import by_the_first_element, by_their_first_elements
+from sea_ident.discrepancy.settle import Settled, settle, settled_in_form
+from sea_ident.discrepancy.slips import by_the_first_element
 from sea_ident.effects import make_effect
 from sea_ident.effects.spring_hysteresis import WIDER
 
@@ -56,7 +56,7 @@ def test_a_first_element_that_is_there_stays(slipping, monkeypatch):
     monkeypatch.setattr(bench, "refine", None)  # nothing is tried
     assert by_the_first_element(bench, fit, start.noise, len(fit.effects) - 1) is fit
     now = Settled(fit, start.noise)
-    assert by_their_first_elements(bench, now, len(bench.effects)) is now
+    assert settled_in_form(bench, now, len(bench.effects), by_the_first_element) is now
 
 
 def test_nothing_but_friction_in_a_spring_is_told_otherwise(slipping):

@@ -19,7 +19,7 @@ from tests.benchmarks.hidden_effects.mjcf import Coupling, Flexibility, Payload,
 from tests.benchmarks.hidden_effects.plants import Truth
 
 STEP = 1e-3
-FASTEST = 0.5
+FARTHEST_SWING = 0.5
 """Angle of its swing on the spring by which a link may get on in a step [rad]."""
 
 
@@ -128,7 +128,7 @@ def simulate_mujoco(
     friction = friction or Friction()
     if any(p.effect == "link_flexibility" for p in planted):
         step = step / 4.0  # the small body between the two springs is fast
-    elif _swings_within(truth) * FASTEST < step:
+    elif _swings_within(truth) * FARTHEST_SWING < step:
         step = step / 4.0
     per_period = round(series.period / step)
     stride = round(1.0 / (rate * step))
