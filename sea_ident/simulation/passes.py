@@ -26,6 +26,10 @@ then within 1e-5 rad of those with steps of a twentieth; torques at reversals ar
 MOST_PARTS = 4
 """Short steps in a long one up to which there are none between."""
 
+LARGE_RATE_ERROR = 0.1
+"""Error of the speeds [rad/s] or [m/s] in a step, by its own estimate, that is told: friction that is as steep as is
+usual stays far below. A spring that nothing damps may swing faster than a step can follow that suits friction."""
+
 LONGEST_WAIT = 7
 """Steps of a length that are not tried at most, after as many in turn that were too long."""
 
@@ -124,6 +128,7 @@ class Passes:
         self._accelerations: list[FloatArray] = []
         self._tau_motor: list[list[float]] = []
         self._tau_spring: list[list[float]] = []
+        self._rate_errors, self._largest_at = np.zeros(system.size), begin
         self.steps = 0
 
     def settle(self, state: FloatArray, samples: int | None = None) -> FloatArray:
@@ -189,6 +194,9 @@ class Passes:
             state = self._step(track, state, begin, k)
         except (SimulationError, OverflowError) as error:
             raise SimulationError(f"the simulation diverged {self._at(begin + k * h)}: {error}") from None
+        errors = np.abs(track.step.error.dot(self._system.increments)[self._system.size :])
+        if float(errors.max()) > float(self._rate_errors.max()):
+            self._rate_errors, self._largest_at = errors, begin + k * h
         self._system.accept(begin + (k + 1) * h, state)
         return state
 
@@ -213,7 +221,7 @@ class Passes:
         robot = self._system.plant.robot
         speeds = np.where(np.isfinite(state[size:]), np.abs(state[size:]), np.inf)
         k = int(np.argmax(speeds))
-        i, side = (k, "link") if k < robot.n else (int(robot.elastic_indices[k - robot.n]), "motor")
+        i, side = self._place(k)
         what = (
             f"the simulation diverged {self._at(time)}: the {side} of joint {robot.joint_names[i]!r} moves at "
             f"{speeds[k]:.3g} {robot.joints[i].position_unit}/s"
@@ -224,6 +232,26 @@ class Passes:
         raise DivergenceError(
             what, f"take a shorter step than {self._clock.step:g} s, or softer gains of the controller"
         )
+
+    def notes(self) -> list[str]:
+        """Whether the steps were too long for what happened, in a sentence."""
+        k = int(np.argmax(self._rate_errors))
+        error = float(self._rate_errors[k])
+        if error < LARGE_RATE_ERROR:
+            return []
+        i, side = self._place(k)
+        joint, step = self._system.plant.robot.joints[i], self._tracks[-1].clock.step
+        return [
+            f"a step of {step:.3g} s is long for the {side} of joint {joint.name!r}: it errs by up to {error:.2g} "
+            f"{joint.position_unit}/s there, {self._at(self._largest_at)}, and the recording is not quite what the "
+            f"robot would do. Take a shorter step, as {0.25 * step:.2g} s; where a spring swings freely, describe its "
+            "damping"
+        ]
+
+    def _place(self, k: int) -> tuple[int, str]:
+        """Joint and side of a coordinate."""
+        robot = self._system.plant.robot
+        return (k, "link") if k < robot.n else (int(robot.elastic_indices[k - robot.n]), "motor")
 
     def _softening(self, i: int, state: FloatArray) -> str:
         """Why a joint diverged where its spring softens and was bent too far; empty where it was not that."""

@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -317,3 +318,21 @@ def test_an_excitation_of_another_robot_is_refused(leg):
     with pytest.raises(SeaIdentError, match=r"designed for the joints hip, knee, ankle; test has a, b, c"):
         simulate(other, excitation, periods=1)
     assert simulate(leg, excitation, periods=1).periods == 1
+
+
+def test_steps_too_long_for_a_spring_that_swings_freely_are_told():
+    """Let go where it is bent by 0.3 rad: steps of a seventh of its period do not follow it, much shorter ones do."""
+    swinging = from_parts(
+        '<link name="base"/>', link("bob"), joint("swing", "base", "bob", "0 1 0"), motor("swing", 'stiffness="2000"')
+    )
+    series = modest_series(swinging)
+    bent = series.motion(np.zeros(1))
+    bent = replace(bent, q=bent.q + 0.3)
+    long, short = (
+        simulate(swinging, series, periods=1, rate=50.0, step=step, start=bent, sensors=SensorNoise.none())
+        for step in (0.02, 0.00125)
+    )
+    (told,) = (text for text in long.warnings if "is long for" in text)
+    assert told.startswith("a step of 0.02 s is long for the motor of joint 'swing': it errs by up to ")
+    assert "as 0.005 s" in told
+    assert not [text for text in short.warnings if "is long for" in text]
