@@ -121,6 +121,37 @@ def test_a_dead_stretch_of_an_encoder_is_placed(leg, recording):
     assert "for 500 samples from sample 1200 (time 12 s) while q_hip moves" in said
 
 
+def test_a_motor_that_is_held_is_asked_for_and_its_encoder_is_not_called_dead(leg, recording):
+    """Its link swings in the spring, and the motor makes some counts in between."""
+    step = 2e-5
+    q, counts = recording.columns["q_hip"], np.zeros(recording.samples)
+    counts[1000:1400], counts[2200:] = 1.0, 2.0
+    still = recording.columns["theta_hip"].mean() + step * counts
+    (said,) = found(leg, recording, theta_hip=still)
+    assert "is the motor held, as by friction or a brake? Or are both of this joint" in said
+    # nor is one that creeps by more of them
+    counts[1500:1600] = np.arange(100)
+    creeping = recording.columns["theta_hip"].mean() + step * counts
+    (said,) = found(leg, recording, theta_hip=creeping)
+    assert "is the motor held" in said
+    # a motor that goes half as far as its link is not held
+    (said,) = found(leg, recording, theta_hip=0.5 * (q - q.mean()))
+    assert "held" not in said
+    assert "are both of this joint" in said
+    # nor is anything said of a rigid joint that makes some counts
+    assert not [text for text in found(leg, recording, q_hip=still, theta_hip=still) if "stands still" in text]
+
+
+def test_a_joint_that_is_held_is_no_reason_to_doubt_the_period(leg, recording):
+    noise = np.random.default_rng(2).normal(0.0, 1e-5, (2, recording.samples))
+    held = {"q_ankle": 0.1 + noise[0], "theta_ankle": 0.1 + noise[1]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        processed, wrong = (process(recording.replace_columns(held), leg, period=period) for period in (10.0, 7.0))
+    assert texts_of(processed.doubts, DoubtKind.PERIOD) == ()
+    assert [text.split()[1] for text in texts_of(wrong.doubts, DoubtKind.PERIOD)] == ["q_hip", "q_knee"]
+
+
 def test_a_spike_is_placed_and_a_coarse_encoder_is_none(leg, recording):
     values = recording.columns["q_hip"].copy()
     values[777] += 0.5

@@ -24,7 +24,7 @@ from sea_ident.discrepancy.findings import (
 )
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of, noise_of_residual, torque_by_joint
-from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.heldout import HeldOut, Kind
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.named import named_effects, named_trend
@@ -32,7 +32,7 @@ from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled
-from sea_ident.discrepancy.standing import longest_standing
+from sea_ident.discrepancy.standing import held_still, longest_standing
 from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
@@ -53,6 +53,10 @@ WORTH_A_NAME = 1e-2
 
 FAR_BEYOND = 3.0
 """Times the noise from which on a gap on other data counts, ..."""
+
+BEYOND_THE_MOTION = 0.05
+"""... or where nothing is missing, with this share of the torque there [-]: a model that is well identified leaves one
+percent of another motion at most, ..."""
 
 GOES = 0.5
 """... shrink of the gap on the recording itself from which on it should go there too [-], ..."""
@@ -129,6 +133,9 @@ def conclude(
         verdict = Verdict.NOT_IN_LIBRARY
     if notes.limited and verdict is Verdict.NOT_IN_LIBRARY:
         verdict = Verdict.CANNOT_TELL
+    beyond: dict[str, tuple[float, float]] = {}
+    if verdict is Verdict.NONE and held is not None and held_gap is not None:
+        beyond = beyond_the_motion(held, held_gap)
     judged = confirmed.beside or (confirmed.bench, confirmed.final)
     standing = longest_standing(judged[0].data)
     facts = words.Facts(
@@ -136,7 +143,8 @@ def conclude(
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
         kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted),
-        standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)),
+        standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)), beyond=beyond,
+        still=held_still(bench.data),
     )  # fmt: skip
     # what follows from such positions is no further fault of the recording
     warnings = (*notes.warnings, *trends.notes, *words.reservations(facts))
@@ -208,6 +216,19 @@ def predicts(held: Gap, torque: Mapping[str, float]) -> bool:
     Wrong units, exchanged joints or another robot leave more.
     """
     return all(left <= torque[joint] for joint, left in held.after.items())
+
+
+def beyond_the_motion(held: HeldOut, gap: Gap) -> dict[str, tuple[float, float]]:
+    """What a model leaves of the torque of another recording, where that is far beyond noise: [N m], and its share [-].
+
+    Where nothing is missing on the recording, it is what this motion does not tell that is wrong.
+    """
+    if held.kind is Kind.OTHER_PERIODS:
+        return {}
+    torque = torque_by_joint(held.bench)
+    left = {joint: (size, size / max(torque[joint], 1e-300)) for joint, size in gap.after.items()}
+    far = (joint for joint, size in gap.after.items() if size > FAR_BEYOND * gap.noise[joint])
+    return {joint: left[joint] for joint in far if left[joint][1] > BEYOND_THE_MOTION}
 
 
 def verdict_of(

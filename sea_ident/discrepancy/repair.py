@@ -107,10 +107,13 @@ def with_what_it_misses(model: Model, observations: Observations, fit: Fit) -> M
         return model
     there, factor = known
     own, fitted = regular_covariance(model), factor @ factor.T
-    blind = np.sqrt(np.diag(own)) > BLIND * np.linalg.norm(factor, axis=1)
+    deviations = np.linalg.norm(factor, axis=1)
+    blind = np.sqrt(np.diag(own)) > BLIND * deviations
     linked = model.robot.elastic_indices.size > 0
     sides = [base.columns[i].side for i in base.independent]
     told = [k for k, side in enumerate(sides) if blind[k] or (linked and side is not Side.MOTOR)]
+    # of what acts in no sample that is compared the fit knows nothing, not even by how much
+    told = [k for k in told if deviations[k] > 0.0]
     if not told:
         return model
     gain = own[:, told] @ np.linalg.inv((own + fitted)[np.ix_(told, told)])

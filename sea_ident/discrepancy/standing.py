@@ -1,5 +1,6 @@
 """Where a motor stands: of the samples near a reversal, those whose speed is no more than noise."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +38,21 @@ def longest_standing(data: PeriodData) -> Standing:
     equation, rows = data.equations[worst], data.left_out[:, worst]
     speed = np.abs(data.motion.dtheta[rows, equation.index])
     return Standing(equation.joint, float(np.mean(rows)), float(np.max(speed, initial=0.0)))
+
+
+def held_still(data: PeriodData) -> tuple[str, ...]:
+    """Joints whose motors stand in every sample, as where friction holds them: nothing is told of what acts there."""
+    motors = (e for e, equation in enumerate(data.equations) if equation.kind is not EquationKind.LINK)
+    return tuple(data.equations[e].joint for e in motors if np.all(data.left_out[:, e]))
+
+
+def not_compared_at(data: PeriodData, joints: Collection[str]) -> PeriodData:
+    """The same periods with nothing compared at some joints."""
+    if not joints:
+        return data
+    left_out = data.left_out.copy()
+    left_out[:, [equation.joint in joints for equation in data.equations]] = True
+    return replace(data, left_out=left_out)
 
 
 def compared_beside_reversals(data: PeriodData) -> PeriodData:

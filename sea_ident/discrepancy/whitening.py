@@ -22,6 +22,11 @@ PARTS_KEPT = 1e8
 """Bytes of columns that are kept."""
 
 
+ROUNDING = 1e-10
+"""Share of a column below which what the samples that are left out leave of it is rounding [-]. A joint that friction
+holds still is in no other sample, and whatever its friction is, it does nothing: of rounding it would be anything."""
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """Neighbouring columns of one part.
@@ -145,7 +150,9 @@ class Whitening:
                 places.append((part, begin, end - begin))
         blocks: list[Block] = []
         if flat:
-            rows, taken = np.ascontiguousarray(self.free.off(np.concatenate(flat, axis=1)).T), 0
+            whole = np.concatenate(flat, axis=1)
+            rows, taken = np.ascontiguousarray(self.free.off(whole).T), 0
+            rows[np.linalg.norm(rows, axis=1) < ROUNDING * np.linalg.norm(whole, axis=0)] = 0.0
             for part, begin, count in places:
                 blocks.append(Block(part, begin, rows[taken : taken + count]))
                 taken += count

@@ -1,7 +1,7 @@
 """A diagnosis in words."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sea_ident.discrepancy.breakaway import Breakaway
 from sea_ident.discrepancy.data import PeriodData
@@ -46,6 +46,9 @@ class Facts:
         sound: whether the recording allows a conclusion; warnings say why where it does not.
         standing: what is not compared beside reversals, at the joint where that is most.
         motors_too_fast: joints whose motors turn too fast for the samples to show a ripple of theirs.
+        still: joints whose motors stand throughout.
+        beyond: what the model leaves of the torque of a held-out recording, by joint, where this one does not tell it:
+            [N m] or [N], and its share [-].
     """
 
     verdict: Verdict
@@ -63,6 +66,8 @@ class Facts:
     sound: bool = True
     standing: Standing | None = None
     motors_too_fast: tuple[str, ...] = ()
+    still: tuple[str, ...] = ()
+    beyond: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def added(self) -> tuple[MissingEffect, ...]:
@@ -85,8 +90,12 @@ def paragraph(facts: Facts) -> str:
             parts.append(f"Against the reference, other parameters changed too: {_changed(changed)}.")
     if facts.remainder > 0.0 and facts.verdict is not Verdict.NONE:
         parts.append(f"A remainder of {_percent(facts.remainder)} of the torque has no name.")
-    if facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
+    if facts.still:
+        parts.append(f"{_still(facts)}.")
+    elif facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
         parts.append(f"{_not_compared(facts, facts.standing)}.")
+    if facts.beyond:
+        parts.append(f"{_beyond(facts)}.")
     if facts.verdict in (Verdict.NONE, Verdict.NOT_IN_LIBRARY) and facts.motors_too_fast:
         parts.append(
             f"Ripple of the turns of the motor of {', '.join(facts.motors_too_fast)} is too fast for these samples and "
@@ -225,7 +234,11 @@ def reservations(facts: Facts) -> list[str]:
         )
     elif facts.added and facts.kind is None:
         found.append("no held-out motion was given: what is named was not tested on another motion")
-    if facts.standing is not None and facts.standing.share > STANDS_LONG:
+    if facts.beyond:
+        found.append(f"{_beyond(facts)}. Diagnose that one as well")
+    if facts.still:
+        found.append(f"{_still(facts)}. Move every joint, or leave those out (joints, on the command line --joints)")
+    elif facts.standing is not None and facts.standing.share > STANDS_LONG:
         found.append(f"{_not_compared(facts, facts.standing)}. Let the joint pass zero velocity faster")
     if any(
         {m.effect, *(a.effect for a in m.alternatives)} >= {"temperature_friction", "friction_drift"}
@@ -239,6 +252,28 @@ def reservations(facts: Facts) -> list[str]:
     if facts.trend.unnamed:
         found.append("the periods show a trend that no effect of the library explains")
     return found
+
+
+def _beyond(facts: Facts) -> str:
+    """Where the model does not foretell the held-out recording for what the motion of this one does not tell."""
+    told = ", ".join(
+        f"{left:.3g} {facts.units[joint]} at {joint} ({_percent(share)} of the torque)"
+        for joint, (left, share) in facts.beyond.items()
+    )
+    return (
+        f"On the recording that was held out the model leaves {told}: that motion shows what this one does not, or "
+        "something was changed between the two"
+    )
+
+
+def _still(facts: Facts) -> str:
+    """Which motors do not move, and what is not told for that."""
+    motors = "motor" if len(facts.still) == 1 else "motors"
+    held = "" if facts.held is None else ", nor tested on data that were held out"
+    return (
+        f"The {motors} of {', '.join(facts.still)} stood in every sample, or nearly: nothing is told of friction, "
+        f"inertia and effects there{held}"
+    )
 
 
 def _not_compared(facts: Facts, standing: Standing) -> str:

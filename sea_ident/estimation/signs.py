@@ -98,7 +98,8 @@ def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
         observations: the recording and the model.
 
     Returns:
-        (n,) inertias [kg m2] or [kg] and (n,) standard deviations.
+        (n,) inertias [kg m2] or [kg] and (n,) standard deviations, infinite where nothing is told: by a joint that
+        friction holds, too, as its torque is what others ask of it.
     """
     robot = observations.robot
     n = robot.n
@@ -108,7 +109,7 @@ def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
     motion = Motion.rigid(np.arange(n + 1.0), still + middle, still, push)
     rows = base_rows(robot, observations.effects, observations.base, motion)
     inertia, std = np.zeros(n), np.full(n, np.inf)
-    for i in range(n):
+    for i in np.flatnonzero(np.any(observations.judged, axis=0)):
         own = observations.rows[:, i]
         norms = np.linalg.norm(own, axis=0)
         seen = norms > 0.0

@@ -29,6 +29,12 @@ STILL = 20
 MOVED = 0.1
 """Share of the range of a position by which it does not move unseen, or within a sample."""
 
+HARDLY = 0.1
+"""Motion of a motor as a share of that of its link up to which it may be held [-], and its encoder stand still."""
+
+FEW_COUNTS = 20
+"""Steps of an encoder up to which a joint does not move that stands still and then makes one."""
+
 HELD = 0.02
 """How far from where it is locked a joint may be [rad] or [m]: a brake gives that much."""
 
@@ -239,9 +245,10 @@ def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> tuple[DoubtKind, l
     for factor, (question, name, setting) in causes.items():
         if abs(slope / factor - 1.0) <= RECOGNISED and abs(correlation) > 0.7:
             return DoubtKind.POSITION, [f"{where}: {question} Then {_say(name, setting)}"]
+    held = "is the motor held, as by friction or a brake? Or " if np.std(theta) < HARDLY * np.std(q) else ""
     return soft, [
-        f"{where}, correlation {correlation:.2f}: are both of this joint, in one unit, and theta after the gear? The "
-        "spring is between them, and all that is identified rests on it"
+        f"{where}, correlation {correlation:.2f}: {held}are both of this joint, in one unit, and theta after the gear? "
+        "The spring is between them, and all that is identified rests on it"
     ]
 
 
@@ -270,8 +277,11 @@ def _still(
     time: FloatArray, name: str, values: FloatArray, joint: Joint, partner: tuple[str, FloatArray] | None
 ) -> list[str]:
     """Whether an encoder stands still while the other one of its joint moves, or jumps when it comes back."""
-    if np.ptp(values) == 0.0:
-        return []  # said elsewhere
+    steps = np.abs(np.diff(values))
+    if np.ptp(values) <= FEW_COUNTS * np.min(steps[steps > 0.0], initial=np.inf):
+        return []  # it is held, or constant, which is said elsewhere
+    if partner is not None and np.ptp(values) < HARDLY * np.ptp(partner[1]):
+        return []
     ends = np.flatnonzero(np.concatenate([np.diff(values) != 0.0, [True]]))
     starts = np.concatenate([[0], ends[:-1] + 1])
     for k in np.argsort(starts - ends, kind="stable")[:5]:

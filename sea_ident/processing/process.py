@@ -24,6 +24,12 @@ from sea_ident.robot import Robot
 SMOOTHING = 0.5
 """Width [s] of the window over which the torque variance is smoothed."""
 
+DIFFERS = 0.1
+"""Share of the motion of a joint by which its periods must differ for the period to be doubted, ..."""
+
+MOVES = 1e-3
+"""... and share of that of the joint that moves most which it must have [-]."""
+
 
 @one_thread
 def process(
@@ -291,14 +297,17 @@ def _kept_periods(
 
 
 def _doubts_of_period(source: str, robot: Robot, stack: FloatArray, period: float) -> list[Doubt]:
-    """Doubts where the periods differ so much that the period must be wrong."""
+    """Doubts where the periods differ so much that the period must be wrong.
+
+    Of a joint that is held there is but the noise of its encoder, which is another one in every period.
+    """
     if len(stack) < 2:
         return []
     found = []
     within = stack.std(axis=(0, 1))
     between = np.sqrt(np.mean(stack.var(axis=0, ddof=1), axis=0))
     for i, name in enumerate(robot.joint_names):
-        if between[i] > 0.1 * within[i] > 0.0:
+        if between[i] > DIFFERS * within[i] and within[i] > MOVES * np.max(within):
             text = (
                 f"{source}: q_{name} differs between periods of {period:g} s by {between[i]:.3g}, "
                 f"{100 * between[i] / within[i]:.0f} % of its motion: is that the period?"

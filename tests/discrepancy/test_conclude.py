@@ -3,6 +3,7 @@
 The effect that the library lacks is planted from here and never registered.
 """
 
+import re
 import sys
 import warnings
 from dataclasses import dataclass, replace
@@ -19,6 +20,7 @@ from sea_ident.discrepancy.conclude import (
     _known_better,
     _locations,
     beyond_the_library,
+    beyond_the_motion,
     explains,
     predicts,
     verdict_of,
@@ -27,9 +29,12 @@ from sea_ident.discrepancy.conclude import (
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
+from sea_ident.discrepancy.gap import torque_by_joint
+from sea_ident.discrepancy.heldout import HeldOut, Kind
 from sea_ident.discrepancy.lack import remainder_share
 from sea_ident.discrepancy.locate import locate
 from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
@@ -137,6 +142,29 @@ def test_what_predicts_worse_than_no_model_does_not_hold_there():
     wild = Gap({"hip": 900.0, "knee": 0.0}, {"hip": 600.0, "knee": 0.0}, noise)
     assert explains(Gap({"hip": 1.0}, {"hip": 0.0}, {"hip": 0.1}), wild)
     assert not predicts(wild, torque)
+
+
+def test_what_is_left_of_another_motion_is_told_where_it_is_more_than_parameters_are_unsure_by(laboratory):
+    bench = laboratory.bench(laboratory.record(motion=1))
+    now = settle(bench, bench.effects)
+    held = HeldOut(bench, now.fit, now.fit, now.noise, now, (), "other", kind=Kind.OTHER_MOTION)
+    torque = torque_by_joint(bench)
+    left = {"hip": 0.2 * torque["hip"], "knee": 0.2 * torque["knee"], "ankle": 0.03 * torque["ankle"]}
+    gap = Gap(left, left, {"hip": 0.01 * torque["hip"], "knee": 0.1 * torque["knee"], "ankle": 0.0})
+    # far beyond noise at the knee it is not, and at the ankle it is little
+    assert beyond_the_motion(held, gap) == {"hip": (left["hip"], pytest.approx(0.2))}
+    # of the same periods nothing else can be left
+    assert beyond_the_motion(replace(held, kind=Kind.OTHER_PERIODS), gap) == {}
+
+
+def test_nothing_is_missing_and_yet_something_was_changed_before_the_motion_that_was_held_out(laboratory):
+    changed = laboratory.record([("torque_offset", "knee", [1.5], {})], motion=1)
+    found = diagnosed(laboratory, laboratory.record(periods=12), holdout=changed)
+    assert found.verdict is Verdict.NONE
+    told = re.search(r"On the recording that was held out the model leaves ([\d.]+) N m at knee \(", found.text)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(1.5, rel=0.05)
+    assert any(text.endswith("Diagnose that one as well") for text in found.warnings)
 
 
 def test_what_only_the_samples_near_reversals_show_has_its_place_there(rippled):

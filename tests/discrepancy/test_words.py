@@ -192,6 +192,30 @@ def test_what_is_not_compared_is_said_where_nothing_is_missing_and_warned_of_whe
     assert "not compared" not in paragraph(replace(nothing, standing=Standing("hip", 0.0, 0.0)))
 
 
+def test_motors_that_stand_are_told_of_with_every_verdict_in_the_place_of_what_is_not_compared():
+    stood = "The motors of hip, knee stood in every sample, or nearly: nothing is told of friction, inertia and effects"
+    standing = Standing("hip", 1.0, 1e-5)
+    for verdict in (Verdict.NONE, Verdict.NAMED, Verdict.SUSPECT):
+        text = paragraph(replace(facts(verdict), standing=standing, still=("hip", "knee")))
+        assert f"{stood} there." in text
+        assert "Beside reversals" not in text
+    gap = Gap({"hip": 0.0}, {"hip": 0.0}, {"hip": 0.1})
+    alone = replace(facts(Verdict.NONE), missing=(), standing=standing, still=("hip",), held=gap)
+    assert "The motor of hip stood" in paragraph(alone)
+    assert "there, nor tested on data that were held out." in paragraph(alone)
+    (warning,) = reservations(alone)
+    assert warning.endswith("Move every joint, or leave those out (joints, on the command line --joints)")
+
+
+def test_what_is_left_of_another_recording_is_said_with_its_share():
+    beyond = replace(facts(Verdict.NONE), missing=(), beyond={"hip": (3.21, 0.12)})
+    told = "On the recording that was held out the model leaves 3.21 N m at hip (12 % of the torque): that motion shows"
+    assert told in paragraph(beyond)
+    (warning,) = reservations(beyond)
+    assert warning.startswith(told)
+    assert warning.endswith("Diagnose that one as well")
+
+
 @pytest.mark.parametrize(
     ("transfer", "said"), [(0.1, "does not hold"), (0.63, "in part only: as it was found it explains 63 %")]
 )

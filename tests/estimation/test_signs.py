@@ -9,7 +9,7 @@ from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.effects import base_effects
 from sea_ident.estimation.identify import visible_parameters
 from sea_ident.estimation.observations import Observations
-from sea_ident.estimation.signs import check_signs, turned_torques
+from sea_ident.estimation.signs import check_signs, joint_inertias, turned_torques
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.processing import process
 from sea_ident.robot import load_robot
@@ -55,3 +55,17 @@ def test_a_spring_beside_the_motor_is_no_wrong_sign(leg, recording):
     both = sprung.replace_columns({"tau_motor_ankle": -np.asarray(sprung.columns["tau_motor_ankle"])})
     # with both the inertia is positive: nothing is claimed of what is not sure
     assert turned_torques(observed(leg, both)) == ()
+
+
+def test_a_joint_that_is_held_has_no_sign(leg, recording):
+    """The torque that holds it is what the other joints ask of it, and no inertia of its own comes out of that."""
+    rng = np.random.default_rng(4)
+    held = {f"{kind}_hip": 0.1 + rng.normal(0.0, 1e-6, recording.samples) for kind in ("q", "theta")}
+    for sign in (-1.0, 1.0):
+        torque = {"tau_motor_hip": sign * recording.columns["tau_motor_hip"]}
+        observations = observed(leg, recording.replace_columns({**held, **torque}))
+        assert turned_torques(observations) == ()
+        assert check_signs(observations) == []
+        inertia, std = joint_inertias(observations)
+        assert np.array_equal(np.isinf(std), [True, False, False])
+        assert inertia[1] > 5.0 * std[1]

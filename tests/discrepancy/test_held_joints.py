@@ -1,0 +1,90 @@
+"""A joint whose motor is held tells nothing of itself, and spoils nothing of what is told of the others."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.standing import held_still, not_compared_at
+from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.motion import FourierSeries
+
+PERIOD = 5.0
+
+
+def holding(motion, joint):
+    """A motion in which one joint is to stay where it is."""
+    moves = np.ones((3, 1))
+    moves[joint] = 0.0
+    return FourierSeries(motion.base_frequency, motion.offset, motion.a * moves, motion.b * moves)
+
+
+@pytest.fixture(scope="module")
+def holding_laboratory(laboratory):
+    """The first motion with the hip held, the second, and both with the ankle held."""
+    first, second = laboratory.motions
+    return replace(laboratory, motions=(holding(first, 0), second, holding(first, 2), holding(second, 2)))
+
+
+def diagnosed(laboratory, recording, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
+        return sea_ident.diagnose(model, recording, period=PERIOD, **options)
+
+
+def test_nothing_is_missing_where_the_last_joint_is_held(holding_laboratory):
+    """None of its samples is compared, and what is left of the columns of its friction is rounding."""
+    found = diagnosed(holding_laboratory, holding_laboratory.record(motion=2, periods=10))
+    assert found.verdict is Verdict.NONE
+    assert "The motor of ankle stood in every sample, or nearly: nothing is told" in found.text
+    assert not [text for text in found.warnings if "wrong sign" in text or "is that the period" in text]
+
+
+def test_what_is_missing_beside_a_joint_that_is_held_is_told_by_the_others_alone(holding_laboratory):
+    """On another motion that joint moves: what was not told of it there is no test of what was."""
+    planted = [("torque_offset", "knee", [1.0], {})]
+    recording, other = (holding_laboratory.record(planted, motion=k, periods=10 - 2 * k) for k in (0, 1))
+    found = diagnosed(holding_laboratory, recording, holdout=other)
+    assert [(m.effect, m.joint) for m in found.missing] == [("torque_offset", "knee")]
+    (offset,) = found.missing[0].parameters
+    assert abs(offset.value - 1.0) < 3.0 * offset.std < 0.1
+    assert found.missing[0].transfer > 0.95
+    assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert "The motor of hip stood in every sample, or nearly" in found.text
+    assert "nor tested on data that were held out" in found.text
+    assert any("Move every joint, or leave those out" in text for text in found.warnings)
+
+
+def test_what_acts_in_no_sample_that_is_compared_stays_as_it_is_described(holding_laboratory):
+    laboratory = holding_laboratory
+    with pytest.warns(SeaIdentWarning, match="is the motor held"):
+        bench = laboratory.bench(laboratory.record(motion=2, periods=10))
+    assert held_still(bench.data) == ("ankle",)
+    now = settle(bench, bench.effects)
+    actuator = laboratory.leg.joints[2].actuator
+    described = {"viscous": actuator.viscous_friction, "coulomb": actuator.coulomb_friction}
+    for kind, value in described.items():
+        assert now.fit.parameters[f"ankle.{kind}_friction"] == value
+        assert now.fit.parameters[f"knee.{kind}_friction"] > 0.0
+    # the spring bends, and its link moves with that: both are told
+    assert now.fit.parameters["ankle.spring_stiffness"] == pytest.approx(120.0, rel=0.05)
+
+
+def test_a_joint_is_taken_out_of_a_comparison_as_a_whole(laboratory):
+    data = laboratory.data(laboratory.record())
+    assert held_still(data) == ()
+    assert not_compared_at(data, ()) is data
+    without = not_compared_at(data, ("knee",))
+    for e, equation in enumerate(data.equations):
+        assert np.all(without.left_out[:, e]) == (equation.joint == "knee")
+        if equation.joint != "knee":
+            assert np.array_equal(without.left_out[:, e], data.left_out[:, e])
+    bench = Bench(without, laboratory.effects)
+    now = settle(bench, bench.effects)
+    assert now.fit.statistic < 1.3 * now.fit.dof
