@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.estimation.observations import NEARLY_ALWAYS
 from sea_ident.reversals import UNCERTAIN_SIGN
 
 BESIDE_REVERSALS = 0
@@ -41,9 +42,9 @@ def longest_standing(data: PeriodData) -> Standing:
 
 
 def held_still(data: PeriodData) -> tuple[str, ...]:
-    """Joints whose motors stand in every sample, as where friction holds them: nothing is told of what acts there."""
+    """Joints whose motors stand nearly always, as where friction holds them: nothing is told of what acts there."""
     motors = (e for e, equation in enumerate(data.equations) if equation.kind is not EquationKind.LINK)
-    return tuple(data.equations[e].joint for e in motors if np.all(data.left_out[:, e]))
+    return tuple(data.equations[e].joint for e in motors if np.mean(data.left_out[:, e]) > NEARLY_ALWAYS)
 
 
 def not_compared_at(data: PeriodData, joints: Collection[str]) -> PeriodData:

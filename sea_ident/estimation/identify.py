@@ -19,7 +19,7 @@ from sea_ident.estimation.estimators import Estimate, Estimator, InstrumentalVar
 from sea_ident.estimation.long_recording import identify_long
 from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.estimation.model import Excerpt, Fit, Model
-from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.observations import Observations, stands
 from sea_ident.estimation.repeated_steps import repeated_steps
 from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.estimation.separability import unseparated_friction
@@ -245,6 +245,10 @@ def visible_parameters(
     for part in regressor_chunks(robot, effects, motion):
         rows = part.sum.reshape(-1, len(base.columns))
         triangle = np.asarray(scipy.linalg.qr(np.vstack([triangle, rows]), mode="r")[0][: len(base.columns)])
+    held = {robot.joint_names[int(i)] for i in np.flatnonzero(stands(processed))}
+    # what follows a speed that is noise would be anything, and what does not may be what friction holds against
+    hidden = [k for k, column in enumerate(base.columns) if column.joint in held and column.side is Side.MOTOR]
+    triangle[:, hidden] = 0.0
     own = triangle[:, base.independent]
     norms = np.linalg.norm(own, axis=0)
     strength = np.linalg.svd(own / np.where(norms > 0.0, norms, 1.0), compute_uv=False)

@@ -27,6 +27,9 @@ CHUNK = 20_000
 REVERSAL = 2.0
 """Speed, in v_off, below which Coulomb friction is not modelled (paper, eq. 3)."""
 
+NEARLY_ALWAYS = 0.95
+"""Share of the samples in which a motor stands from which on nothing is told of what acts there [-]."""
+
 CACHE = 400 * 2**20
 """Bytes of period regressors that are kept rather than computed again."""
 
@@ -102,6 +105,17 @@ def friction_is_modelled(robot: Robot, effects: Sequence[Effect], motion: Motion
     for effect, kind, index in _frictions(robot, effects):
         valid[:, index] &= np.abs(getattr(motion, kind)[:, index]) > REVERSAL * effect.smoothing
     return valid
+
+
+def stands(processed: ProcessedRecording) -> NDArray[np.bool_]:
+    """(n,) whether a motor hardly ever moves faster than its periods differ, as where friction or a brake holds it.
+
+    Its torque is then what others ask of it, and says nothing of its friction or of what it moves.
+    """
+    speeds = processed.motion.dtheta
+    each = [motion.dtheta for motion in processed.period_motions]
+    shares = [np.mean(around_mean_reversal(speeds[:, i], [s[:, i] for s in each])) for i in range(speeds.shape[1])]
+    return np.array(shares) > NEARLY_ALWAYS
 
 
 def _frictions(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.estimation.observations import Observations, base_rows
+from sea_ident.estimation.observations import Observations, base_rows, stands
 from sea_ident.exceptions import IdentificationError
 from sea_ident.motion import Motion
 from sea_ident.processing.doubt import DoubtKind, texts_of
@@ -109,7 +109,7 @@ def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
     motion = Motion.rigid(np.arange(n + 1.0), still + middle, still, push)
     rows = base_rows(robot, observations.effects, observations.base, motion)
     inertia, std = np.zeros(n), np.full(n, np.inf)
-    for i in np.flatnonzero(np.any(observations.judged, axis=0)):
+    for i in np.flatnonzero(~stands(observations.processed)):
         own = observations.rows[:, i]
         norms = np.linalg.norm(own, axis=0)
         seen = norms > 0.0

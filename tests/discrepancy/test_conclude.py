@@ -163,7 +163,7 @@ def test_nothing_is_missing_and_yet_something_was_changed_before_the_motion_that
     assert found.verdict is Verdict.NONE
     told = re.search(r"On the recording that was held out the model leaves ([\d.]+) N m at knee \(", found.text)
     assert told is not None
-    assert float(told[1]) == pytest.approx(1.5, rel=0.05)
+    assert float(told[1]) == pytest.approx(1.5, rel=0.1)  # beside reversals it is not counted
     assert any(text.endswith("Diagnose that one as well") for text in found.warnings)
 
 

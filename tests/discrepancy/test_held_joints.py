@@ -11,6 +11,7 @@ from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import held_still, not_compared_at
+from sea_ident.estimation.observations import stands
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
 
@@ -88,3 +89,39 @@ def test_a_joint_is_taken_out_of_a_comparison_as_a_whole(laboratory):
     bench = Bench(without, laboratory.effects)
     now = settle(bench, bench.effects)
     assert now.fit.statistic < 1.3 * now.fit.dof
+
+
+def test_of_a_motor_that_is_held_no_friction_is_identified_and_the_others_are_as_sure(holding_laboratory):
+    """A friction that follows the noise of its encoder would be of any size, and the others unsure with it."""
+    laboratory, leg = holding_laboratory, holding_laboratory.leg
+    recording = laboratory.record(motion=2, periods=10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model, moving = (sea_ident.identify(leg, each, period=PERIOD) for each in (recording, laboratory.record()))
+    told = dict(zip(model.names, zip(model.values, model.std, strict=True), strict=True))
+    frictions = {"ankle.viscous_friction", "ankle.coulomb_friction"}
+    assert set(moving.names) - set(told) >= frictions
+    assert any("not told, or told only in sum" in text and "ankle.coulomb_friction" in text for text in model.warnings)
+    assert told["foot.mz"][1] < 0.01
+    for joint in ("hip", "knee"):
+        actuator = leg.joints[leg.index(joint)].actuator
+        for kind in ("viscous", "coulomb"):
+            value, std = told[f"{joint}.{kind}_friction"]
+            assert abs(value - getattr(actuator, f"{kind}_friction")) < 4.0 * std < 0.2
+
+
+def test_motors_that_are_slow_are_not_held(holding_laboratory):
+    """A hundredth of the usual speed is slower than friction turns over, and yet far beyond the noise of an encoder."""
+    laboratory = holding_laboratory
+    first = laboratory.motions[1]
+    slow = FourierSeries(0.1 * first.base_frequency, first.offset, 0.1 * first.a, 0.1 * first.b)
+    other = replace(laboratory, motions=(slow,))
+    recording = other.record(periods=4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        fast, still = (
+            stands(sea_ident.process(each, laboratory.leg, period=period))
+            for each, period in ((recording, 10.0 * PERIOD), (laboratory.record(motion=0, periods=10), PERIOD))
+        )
+    assert fast.tolist() == [False, False, False]
+    assert still.tolist() == [True, False, False]
