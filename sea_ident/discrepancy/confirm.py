@@ -7,7 +7,7 @@ import numpy as np
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.data import BARELY_SEEN, away_from_reversals
+from sea_ident.discrepancy.data import BARELY_SEEN, MOST_LEFT_OUT, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import flat_steps, scatter_p, significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
@@ -19,9 +19,6 @@ from sea_ident.side_by_side import side_by_side
 
 FAR = 6
 """How many times the usual is left out around reversals where the search is repeated without what is slow."""
-
-MOST_LEFT_OUT = 0.6
-"""Share of the samples of an equation beyond which too little is left to search [-]."""
 
 PROMISING = 0.3
 """Share of the excess there that a candidate must promise to explain for the search to be repeated [-]."""

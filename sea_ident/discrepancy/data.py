@@ -338,25 +338,34 @@ def around_reversals(
     return left_out
 
 
+MOST_LEFT_OUT = 0.6
+"""Share of the samples of an equation beyond which too little is left to compare [-]."""
+
+
 def away_from_reversals(data: PeriodData, caution: int = 2) -> PeriodData:
     """The same periods with more left out around every reversal.
 
     What is said of a model must hold there too: at reversals, the mean of what differs from pass to pass, and the
     time of a sample within its interval, look like small effects of friction and of delay.
 
+    Where a period has few samples, those beside its reversals are most of them: then only what is slow counts.
+
     Args:
         data: the periods.
         caution: how many times the usual is left out.
     """
-    wide = around_reversals(
-        data.motion,
-        data.equations,
-        data.period_motions,
-        data.step_errors,
-        samples=caution * REVERSAL_SAMPLES,
-        uncertain=caution * UNCERTAIN_SIGN,
-    )
-    return replace(data, left_out=data.left_out | wide, caution=caution)
+
+    def wide(samples: int) -> NDArray[np.bool_]:
+        """(N, E) what is left out, so many samples beside a reversal at least."""
+        motion, periods, errors = data.motion, data.period_motions, data.step_errors
+        slow = caution * UNCERTAIN_SIGN
+        return data.left_out | around_reversals(
+            motion, data.equations, periods, errors, samples=samples, uncertain=slow
+        )
+
+    left_out = wide(caution * REVERSAL_SAMPLES)
+    lost = (np.mean(left_out, axis=0) > MOST_LEFT_OUT) & (np.mean(data.left_out, axis=0) <= MOST_LEFT_OUT)
+    return replace(data, left_out=wide(REVERSAL_SAMPLES) if np.any(lost) else left_out, caution=caution)
 
 
 def spectrum(values: FloatArray, harmonics: int) -> NDArray[np.complex128]:

@@ -9,7 +9,12 @@ import pytest
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.confirm import Confirmed, _begun, confirm, without_the_slow
-from sea_ident.discrepancy.data import BARELY_SEEN, around_reversals, away_from_reversals
+from sea_ident.discrepancy.data import (
+    BARELY_SEEN,
+    MOST_LEFT_OUT,
+    around_reversals,
+    away_from_reversals,
+)
 from sea_ident.discrepancy.exchange import Outdone
 from sea_ident.discrepancy.judge import significance, torque_change
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
@@ -211,3 +216,15 @@ def test_a_search_tells_what_it_had_before_it_took_anything_out(rippled, monkeyp
     assert found.whole.added >= 1
     assert found.whole.final is taken[0]
     assert found.whole.effects[0].name == "torque_ripple"
+
+
+def test_few_samples_in_a_period_leave_enough_to_confirm_by(laboratory):
+    """At 20 Hz those beside the reversals of a motion of five seconds are most: there only what is slow counts."""
+    bench = laboratory.bench(laboratory.record([("torque_offset", "knee", [1.5], {})], periods=10, rate=20.0))
+    usual = np.mean(bench.data.left_out, axis=0)
+    data = away_from_reversals(bench.data)
+    assert np.all(np.mean(data.left_out, axis=0) <= MOST_LEFT_OUT)
+    assert np.any(np.mean(data.left_out, axis=0) > usual)
+    assert np.all(data.left_out | ~bench.data.left_out)
+    found = confirm(bench, search(bench, bench.effects))
+    assert [(e.name, e.joint) for e in found.selection.effects] == [("torque_offset", "knee")]
