@@ -9,7 +9,7 @@ from scipy import stats
 
 from sea_ident._typing import FloatArray
 from sea_ident.estimation.estimators import Estimate
-from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.observations import Observations, stands
 from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.turning import turning_covariance
 
@@ -126,7 +126,21 @@ def honest_uncertainty(observations: Observations, estimate: Estimate) -> Uncert
     if text:
         kind, found = CovarianceKind.REMAINDER, (*found, text)
     rest = misfit + turning_covariance(observations, estimate, mean, residuals)
+    rest += _standing_covariance(observations, estimate, mean)
     return Uncertainty(covariance + rest, freedom, kind, influences, covariance, found)
+
+
+def _standing_covariance(observations: Observations, estimate: Estimate, mean: FloatArray) -> FloatArray:
+    """(b, b) part of the covariance by the torque with which friction holds a motor that stands.
+
+    It is anything up to that of breakaway, and may go along with the very torque of a parameter: as large as what it
+    leaves in the residual (N, n), and the same in all samples.
+    """
+    covariance = np.zeros((len(estimate.values),) * 2)
+    for i in np.flatnonzero(stands(observations.processed)):
+        moves = estimate.instruments[:, i] @ estimate.inverse.T
+        covariance += float(np.sum(mean[:, i] ** 2)) * moves.T @ moves
+    return covariance
 
 
 def _misfit(

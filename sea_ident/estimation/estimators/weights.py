@@ -8,7 +8,7 @@ from scipy.optimize import isotonic_regression
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.coulomb_friction import CoulombFriction
-from sea_ident.estimation.observations import Observations
+from sea_ident.estimation.observations import Observations, stands
 from sea_ident.estimation.solve import Solution, solve_weighted
 from sea_ident.processing.variance import smooth_over_phase
 
@@ -82,17 +82,19 @@ def sample_weights(observations: Observations, smoothing: float, share: FloatArr
     count = np.maximum(valid.sum(axis=0) - rows.shape[-1] / rows.shape[1], 1.0)
     noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1.0)
     rest = np.zeros(rows.shape[1])
+    # what holds a motor that stands is one error all along, not another one in every sample
+    errors = np.where(stands(processed), len(torque), 1)
     for _ in range(ROUNDS):
         weights = valid / (variance + rest)
         solution = solve_weighted(rows, torque, weights)
         residual = torque - rows @ solution.values
-        excess = (residual**2 * valid).sum(axis=0) / count - noise
+        excess = errors * ((residual**2 * valid).sum(axis=0) / count - noise)
         before, rest = rest, np.where(excess > LEAST_REST * noise, excess, 0.0)
         if np.allclose(rest, before, rtol=1e-2):
             break
     notes = tuple(
-        f"{name}: {r**0.5:.3g} of the residual is beyond the scatter between periods and adds to the weighting"
-        for name, r in zip(observations.robot.joint_names, rest, strict=True)
+        f"{name}: {(r / e) ** 0.5:.3g} of the residual is beyond the scatter between periods and adds to the weighting"
+        for name, r, e in zip(observations.robot.joint_names, rest, errors, strict=True)
         if r > 0.0 and processed.periods > 1
     )
     return SampleWeights(weights, variance + rest, solution, notes, warnings)
