@@ -1,6 +1,6 @@
 """Checks at the border: recordings that prove nothing, clipped channels, spikes, pauses."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,7 +50,7 @@ class Findings:
     limited: bool = False
 
 
-def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float]) -> Findings:
+def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float], still: Collection[str] = ()) -> Findings:
     """Findings with the joints whose noise is larger than their torque: of them, and with them, nothing can be told.
 
     That happens where a joint hardly follows its motion, as one that friction holds: what its encoder then shows is
@@ -60,8 +60,10 @@ def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float]) -> Findin
         findings: what was found before.
         gap: of the recording.
         torque: rms torque by joint [N m] or [N].
+        still: joints of which nothing is compared, for they stand; where all do, they count all the same.
     """
-    lost = [name for name, noise in gap.noise.items() if not noise < torque[name]]
+    compared = [name for name in gap.noise if name not in still] or list(gap.noise)
+    lost = [name for name in compared if not gap.noise[name] < torque[name]]
     if not lost:
         return findings
     text = (

@@ -113,11 +113,13 @@ def conclude(
     unexplained = max(left - left_dof, 0.0) / max(statistic - dof, 1.0) if selection.added else 1.0
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
-    holds = held_gap is None or explains(gap, held_gap)
-    if held is not None and held_gap is not None:
+    still = held_still(bench.data)
+    # what carries a motor that stands asks for other torques of all joints where that moves: no fault of what is named
+    holds = held_gap is None or bool(still) or explains(gap, held_gap)
+    if held is not None and held_gap is not None and not still:
         holds = holds and predicts(held_gap, torque_by_joint(held.bench))
     sound = notes
-    notes = check.drowned(notes, gap, torque_by_joint(bench))
+    notes = check.drowned(notes, gap, torque_by_joint(bench), still)
     lost = notes is not sound
     if lost:
         remainder = 0.0
@@ -144,7 +146,7 @@ def conclude(
         units=check.torque_units(bench.robot),
         kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted),
         standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)), beyond=beyond,
-        still=held_still(bench.data),
+        still=still,
     )  # fmt: skip
     # what follows from such positions is no further fault of the recording
     warnings = (*notes.warnings, *trends.notes, *words.reservations(facts))

@@ -12,6 +12,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import SIGNALS, closing_weights, mean_of_periods
 from sea_ident.effects import Contribution
 from sea_ident.effects.state import Side
+from sea_ident.estimation.observations import stands
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording, process
@@ -287,6 +288,10 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         max(int(least / REGRESSOR_MARGIN), 1),
     )
     errors = _step_errors(processed, motion, processed.period)
+    equations = equations_of(robot)
+    left_out = around_reversals(motion, equations, processed.period_motions, errors)
+    stood = stands(processed)
+    left_out[:, [stood[eq.index] and eq.kind is not EquationKind.LINK for eq in equations]] = True
     return PeriodData(
         robot=robot,
         source=processed.source,
@@ -296,10 +301,10 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
         period_motions=motions,
         period_tau_motor=processed.period_tau_motor,
         channels=processed.channels,
-        equations=equations_of(robot),
+        equations=equations,
         harmonics=harmonics,
         reach=max(processed.link_harmonics, processed.motor_harmonics),
-        left_out=around_reversals(motion, equations_of(robot), processed.period_motions, errors),
+        left_out=left_out,
         warnings=processed.warnings,
         places=processed.places,
         step_errors=errors,

@@ -136,7 +136,7 @@ def held_out(
     data = not_compared_at(data, held_still(bench.data))
     found = tried(Bench(data, bench.effects), selection, processed.source)
     gap = gap_of(found.bench, found.before, found.after, found.noise)
-    lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench))
+    lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench), held_still(data))
     if lost.fatal:
         warnings.extend(f"held-out data: {text}" for text in lost.warnings)
         warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")

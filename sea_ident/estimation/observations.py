@@ -28,7 +28,10 @@ REVERSAL = 2.0
 """Speed, in v_off, below which Coulomb friction is not modelled (paper, eq. 3)."""
 
 NEARLY_ALWAYS = 0.95
-"""Share of the samples in which a motor stands from which on nothing is told of what acts there [-]."""
+"""Share of the samples in which a motor stands from which on nothing is told of what acts there [-], ..."""
+
+HARDLY_MOVES = 2e-3
+"""... or share of the speed of the fastest up to which it creeps where the others push it [-]."""
 
 CACHE = 400 * 2**20
 """Bytes of period regressors that are kept rather than computed again."""
@@ -108,14 +111,17 @@ def friction_is_modelled(robot: Robot, effects: Sequence[Effect], motion: Motion
 
 
 def stands(processed: ProcessedRecording) -> NDArray[np.bool_]:
-    """(n,) whether a motor hardly ever moves faster than its periods differ, as where friction or a brake holds it.
+    """(n,) whether a motor hardly moves, as where friction or a brake holds it.
 
-    Its torque is then what others ask of it, and says nothing of its friction or of what it moves.
+    Hardly ever faster than its periods differ, or far slower than the fastest of all. Its torque is then what others
+    ask of it, and says nothing of its friction or of what it moves.
     """
     speeds = processed.motion.dtheta
     each = [motion.dtheta for motion in processed.period_motions]
     shares = [np.mean(around_mean_reversal(speeds[:, i], [s[:, i] for s in each])) for i in range(speeds.shape[1])]
-    return np.array(shares) > NEARLY_ALWAYS
+    rms = np.sqrt(np.mean(speeds**2, axis=0))
+    stood: NDArray[np.bool_] = (np.array(shares) > NEARLY_ALWAYS) | (rms < HARDLY_MOVES * np.max(rms))
+    return stood
 
 
 def _frictions(

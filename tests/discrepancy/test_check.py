@@ -20,6 +20,9 @@ def test_noise_beyond_the_torque_lets_nothing_be_told():
         assert found.fatal
         assert found.warnings[0] == "clipped"
         assert "the noise of grip" in found.warnings[1]
+        # of a joint that stands nothing is compared, and the others are told without it; where all do, none is
+        assert drowned(before, lost, {"hip": 10.0, "grip": 4.0}, ("grip",)) is before
+        assert drowned(before, lost, {"hip": 10.0, "grip": 4.0}, ("hip", "grip")) == found
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,12 @@ from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import held_still, not_compared_at
+from sea_ident.effects import make_effect
 from sea_ident.estimation.observations import stands
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries
 from sea_ident.regressor import prior_parameters
+from sea_ident.simulation import PlantedEffect
 
 PERIOD = 5.0
 
@@ -146,3 +148,37 @@ def test_what_only_a_motor_that_is_held_tells_is_as_unsure_as_the_friction_that_
     assert std["thigh.Iyy*"] > 1.0
     assert std["shank.mz*"] < 0.01
     assert std["shank.Iyy*"] < 0.01
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """A rigid arm, a wide motion of it and one in which friction holds its wrists, which the others push about."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        robot = sea_ident.load_robot("example:ur_description/urdf/ur5_robot.urdf")
+    rng = np.random.default_rng(8)
+    a, b = 0.25 * rng.standard_normal((2, 6, 3))
+    offset = np.array([0.0, -1.2, 0.8, 0.2, 0.3, 0.0])
+    wrists = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])[:, None]
+    return robot, FourierSeries(0.2, offset, a, b), FourierSeries(0.2, offset, a * wrists, b * wrists)
+
+
+@pytest.mark.scenario
+def test_wrists_that_friction_holds_hide_nothing_of_the_joints_that_carry_them(arm):
+    """Where they move, all torques are other ones, for what they carry was told as one body: no fault of the name."""
+    robot, wide, held = arm
+    planted = [PlantedEffect(make_effect("torque_constant", "elbow_joint"), np.array([0.2]))]
+    recording, other = (
+        sea_ident.simulate(robot, series, periods=10, seed=seed, effects=planted).recording
+        for series, seed in ((held, 3), (wide, 4))
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = sea_ident.identify(robot, recording, period=PERIOD)
+        found = sea_ident.diagnose(model, recording, holdout=other, period=PERIOD)
+    assert [(m.effect, m.joint) for m in found.missing] == [("torque_constant", "elbow_joint")]
+    assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    (constant,) = found.missing[0].parameters
+    assert abs(constant.value - 0.2) < 4.0 * constant.std < 0.05
+    assert "The motors of wrist_1_joint, wrist_2_joint, wrist_3_joint stood in every sample, or nearly" in found.text
+    assert found.simulation_gap["q"].shrink > 0.9
