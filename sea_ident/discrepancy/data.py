@@ -290,7 +290,7 @@ def period_data(processed: ProcessedRecording, robot: Robot) -> PeriodData:
     errors = _step_errors(processed, motion, processed.period)
     equations = equations_of(robot)
     left_out = around_reversals(motion, equations, processed.period_motions, errors)
-    stood = stands(processed)
+    stood = stands(robot, processed)
     left_out[:, [stood[eq.index] and eq.kind is not EquationKind.LINK for eq in equations]] = True
     return PeriodData(
         robot=robot,

@@ -245,7 +245,7 @@ def visible_parameters(
     for part in regressor_chunks(robot, effects, motion):
         rows = part.sum.reshape(-1, len(base.columns))
         triangle = np.asarray(scipy.linalg.qr(np.vstack([triangle, rows]), mode="r")[0][: len(base.columns)])
-    held = {robot.joint_names[int(i)] for i in np.flatnonzero(stands(processed))}
+    held = {robot.joint_names[int(i)] for i in np.flatnonzero(stands(robot, processed))}
     # what follows a speed that is noise would be anything, and what does not may be what friction holds against
     hidden = [k for k, column in enumerate(base.columns) if column.joint in held and column.side is Side.MOTOR]
     triangle[:, hidden] = 0.0

@@ -110,17 +110,18 @@ def friction_is_modelled(robot: Robot, effects: Sequence[Effect], motion: Motion
     return valid
 
 
-def stands(processed: ProcessedRecording) -> NDArray[np.bool_]:
+def stands(robot: Robot, processed: ProcessedRecording) -> NDArray[np.bool_]:
     """(n,) whether a motor hardly moves, as where friction or a brake holds it.
 
-    Hardly ever faster than its periods differ, or far slower than the fastest of all. Its torque is then what others
-    ask of it, and says nothing of its friction or of what it moves.
+    Hardly ever faster than its periods differ, or far slower than the fastest that turns, or slides, as it does. Its
+    torque is then what others ask of it, and says nothing of its friction or of what it moves.
     """
     speeds = processed.motion.dtheta
     each = [motion.dtheta for motion in processed.period_motions]
     shares = [np.mean(around_mean_reversal(speeds[:, i], [s[:, i] for s in each])) for i in range(speeds.shape[1])]
-    rms = np.sqrt(np.mean(speeds**2, axis=0))
-    stood: NDArray[np.bool_] = (np.array(shares) > NEARLY_ALWAYS) | (rms < HARDLY_MOVES * np.max(rms))
+    rms, slides = np.sqrt(np.mean(speeds**2, axis=0)), np.array([joint.prismatic for joint in robot.joints])
+    fastest = np.array([np.max(rms[slides == slide]) for slide in slides])
+    stood: NDArray[np.bool_] = (np.array(shares) > NEARLY_ALWAYS) | (rms < HARDLY_MOVES * fastest)
     return stood
 
 

@@ -109,7 +109,7 @@ def joint_inertias(observations: Observations) -> tuple[FloatArray, FloatArray]:
     motion = Motion.rigid(np.arange(n + 1.0), still + middle, still, push)
     rows = base_rows(robot, observations.effects, observations.base, motion)
     inertia, std = np.zeros(n), np.full(n, np.inf)
-    for i in np.flatnonzero(~stands(observations.processed)):
+    for i in np.flatnonzero(~stands(robot, observations.processed)):
         own = observations.rows[:, i]
         norms = np.linalg.norm(own, axis=0)
         seen = norms > 0.0

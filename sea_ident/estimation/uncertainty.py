@@ -137,7 +137,7 @@ def _standing_covariance(observations: Observations, estimate: Estimate, mean: F
     leaves in the residual (N, n), and the same in all samples.
     """
     covariance = np.zeros((len(estimate.values),) * 2)
-    for i in np.flatnonzero(stands(observations.processed)):
+    for i in np.flatnonzero(stands(observations.robot, observations.processed)):
         moves = estimate.instruments[:, i] @ estimate.inverse.T
         covariance += float(np.sum(mean[:, i] ** 2)) * moves.T @ moves
     return covariance

@@ -28,7 +28,7 @@ DIFFERS = 0.1
 """Share of the motion of a joint by which its periods must differ for the period to be doubted, ..."""
 
 MOVES = 1e-3
-"""... and share of that of the joint that moves most which it must have [-]."""
+"""... and share of that of the joint that turns, or slides, most which it must have [-]."""
 
 
 @one_thread
@@ -306,8 +306,9 @@ def _doubts_of_period(source: str, robot: Robot, stack: FloatArray, period: floa
     found = []
     within = stack.std(axis=(0, 1))
     between = np.sqrt(np.mean(stack.var(axis=0, ddof=1), axis=0))
+    slides = np.array([joint.prismatic for joint in robot.joints])
     for i, name in enumerate(robot.joint_names):
-        if between[i] > DIFFERS * within[i] and within[i] > MOVES * np.max(within):
+        if between[i] > DIFFERS * within[i] and within[i] > MOVES * np.max(within[slides == slides[i]]):
             text = (
                 f"{source}: q_{name} differs between periods of {period:g} s by {between[i]:.3g}, "
                 f"{100 * between[i] / within[i]:.0f} % of its motion: is that the period?"

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def test_motors_that_are_slow_are_not_held(holding_laboratory):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         fast, still = (
-            stands(sea_ident.process(each, laboratory.leg, period=period))
+            stands(laboratory.leg, sea_ident.process(each, laboratory.leg, period=period))
             for each, period in ((recording, 10.0 * PERIOD), (laboratory.record(motion=0, periods=10), PERIOD))
         )
     assert fast.tolist() == [False, False, False]
@@ -182,3 +183,22 @@ def test_wrists_that_friction_holds_hide_nothing_of_the_joints_that_carry_them(a
     assert abs(constant.value - 0.2) < 4.0 * constant.std < 0.05
     assert "The motors of wrist_1_joint, wrist_2_joint, wrist_3_joint stood in every sample, or nearly" in found.text
     assert found.simulation_gap["q"].shrink > 0.9
+
+
+def test_a_slide_is_not_held_for_being_slow_beside_what_turns(laboratory):
+    """A millimetre a second is a slow slide, and a milliradian a second beside a radian no motion at all."""
+    robot = sea_ident.load_robot("exo_leg")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        processed = sea_ident.process(laboratory.record(periods=8), robot, period=PERIOD)
+    slower = np.array([1.0, 1e-3, 1.0])
+    slow = replace(
+        processed,
+        motion=replace(processed.motion, dtheta=processed.motion.dtheta * slower),
+        period_motions=tuple(replace(m, dtheta=m.dtheta * slower) for m in processed.period_motions),
+    )
+    assert stands(robot, slow).tolist() == [False, True, False]
+    sliding = SimpleNamespace(
+        joints=[replace(j, type="prismatic" if j.name == "knee" else j.type) for j in robot.joints]
+    )
+    assert stands(sliding, slow).tolist() == [False, False, False]

@@ -83,7 +83,7 @@ def sample_weights(observations: Observations, smoothing: float, share: FloatArr
     noise = (variance * valid).sum(axis=0) / np.maximum(valid.sum(axis=0), 1.0)
     rest = np.zeros(rows.shape[1])
     # what holds a motor that stands is one error all along, not another one in every sample
-    errors = np.where(stands(processed), len(torque), 1)
+    errors = np.where(stands(observations.robot, processed), len(torque), 1)
     for _ in range(ROUNDS):
         weights = valid / (variance + rest)
         solution = solve_weighted(rows, torque, weights)
