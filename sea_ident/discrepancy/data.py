@@ -51,6 +51,9 @@ BARELY_SEEN = 1e-3
 """... but from this on where a model is judged: a jump of friction that falls between two samples is many times the
 noise."""
 
+MOST_LEFT_OUT = 0.6
+"""Share of the samples of an equation beyond which too little is left to compare [-]."""
+
 
 class EquationKind(StrEnum):
     """Which equation of a joint."""
@@ -341,10 +344,6 @@ def around_reversals(
         repeated = None if errors is None else errors[:, SIGNALS.index(kind), :, equation.index]
         left_out[:, e] = around_mean_reversal(speed, each, repeated, samples=samples, uncertain=uncertain)
     return left_out
-
-
-MOST_LEFT_OUT = 0.6
-"""Share of the samples of an equation beyond which too little is left to compare [-]."""
 
 
 def away_from_reversals(data: PeriodData, caution: int = 2) -> PeriodData:

@@ -21,7 +21,6 @@ from sea_ident.effects import Effect
 PARTS_KEPT = 1e8
 """Bytes of columns that are kept."""
 
-
 ROUNDING = 1e-10
 """Share of a column below which what the samples that are left out leave of it is rounding [-]. A joint that friction
 holds still is in no other sample, and whatever its friction is, it does nothing: of rounding it would be anything."""

@@ -240,7 +240,7 @@ class Passes:
         if error < LARGE_RATE_ERROR:
             return []
         i, side = self._place(k)
-        joint, step = self._system.plant.robot.joints[i], self._tracks[-1].clock.step
+        joint, step = self._system.plant.robot.joints[i], self._clock.step
         return [
             f"a step of {step:.3g} s is long for the {side} of joint {joint.name!r}: it errs by up to {error:.2g} "
             f"{joint.position_unit}/s there, {self._at(self._largest_at)}, and the recording is not quite what the "
