@@ -1,6 +1,6 @@
 """What a search, its confirmation and the held-out data add up to: the verdict and its evidence."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -114,10 +114,7 @@ def conclude(
     gap = gap_of(bench, start.fit, final.fit, final.noise)
     held_gap = None if held is None else gap_of(held.bench, held.before, held.after, held.noise)
     still = held_still(bench.data)
-    # what carries a motor that stands asks for other torques of all joints where that moves: no fault of what is named
-    holds = held_gap is None or bool(still) or explains(gap, held_gap)
-    if held is not None and held_gap is not None and not still:
-        holds = holds and predicts(held_gap, torque_by_joint(held.bench))
+    holds = held is None or held_gap is None or goes_there(gap, held_gap, torque_by_joint(held.bench), still)
     sound = notes
     notes = check.drowned(notes, gap, torque_by_joint(bench), still)
     lost = notes is not sound
@@ -205,6 +202,15 @@ def beyond_the_library(confirmed: Confirmed, trends: TrendTest) -> bool:
     if trends.may_leave(remainder_share(confirmed.bench, confirmed.final)):
         return False
     return confirmed.final.fit.excess > UNEXPLAINED_BY_FRICTION * max(confirmed.start.fit.excess, 1.0)
+
+
+def goes_there(training: Gap, held: Gap, torque: Mapping[str, float], still: Collection[str]) -> bool:
+    """Whether a gap is what another recording allows it to be, if what was found on the one is right.
+
+    Where a joint that stood (`still`) moves there, what it carries asks for other torques of all joints: that is no
+    fault of what was found, of which the other recording judges by itself.
+    """
+    return bool(still) or (explains(training, held) and predicts(held, torque))
 
 
 def explains(training: Gap, held: Gap) -> bool:

@@ -44,7 +44,7 @@ def told(
         f"{m.effect} {m.joint} " + " ".join(f"{p.value:.4g} +- {p.std:.2g}" for p in m.parameters)
         for m in found.missing
     ]
-    return f"{found.verdict} {'; '.join(names)}", recording
+    return f"{found.verdict} {'; '.join(names)}".strip(), recording
 
 
 def errors(robot: Robot, recording: Recording, full: Recording, period: float) -> str:

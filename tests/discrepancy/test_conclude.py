@@ -22,6 +22,7 @@ from sea_ident.discrepancy.conclude import (
     beyond_the_library,
     beyond_the_motion,
     explains,
+    goes_there,
     predicts,
     verdict_of,
     without_sizes,
@@ -142,6 +143,10 @@ def test_what_predicts_worse_than_no_model_does_not_hold_there():
     wild = Gap({"hip": 900.0, "knee": 0.0}, {"hip": 600.0, "knee": 0.0}, noise)
     assert explains(Gap({"hip": 1.0}, {"hip": 0.0}, {"hip": 0.1}), wild)
     assert not predicts(wild, torque)
+    found = Gap({"hip": 1.0}, {"hip": 0.0}, {"hip": 0.1})
+    assert not goes_there(found, wild, torque, ())
+    # of what a joint carries that stood, nothing was known: that is no fault of what was found
+    assert goes_there(found, wild, torque, ("hip",))
 
 
 def test_what_is_left_of_another_motion_is_told_where_it_is_more_than_parameters_are_unsure_by(laboratory):

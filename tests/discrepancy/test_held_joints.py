@@ -10,6 +10,7 @@ import pytest
 import sea_ident
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.data import EquationKind, period_data
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.standing import held_still, not_compared_at
 from sea_ident.effects import make_effect
@@ -24,7 +25,7 @@ PERIOD = 5.0
 
 def holding(motion, joint):
     """A motion in which one joint is to stay where it is."""
-    moves = np.ones((3, 1))
+    moves = np.ones((motion.n, 1))
     moves[joint] = 0.0
     return FourierSeries(motion.base_frequency, motion.offset, motion.a * moves, motion.b * moves)
 
@@ -153,7 +154,7 @@ def test_what_only_a_motor_that_is_held_tells_is_as_unsure_as_the_friction_that_
 
 @pytest.fixture(scope="module")
 def arm():
-    """A rigid arm, a wide motion of it and one in which friction holds its wrists, which the others push about."""
+    """A rigid arm, a wide motion of it, and one in which friction holds its wrists, which the others push about."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
         robot = sea_ident.load_robot("example:ur_description/urdf/ur5_robot.urdf")
@@ -185,6 +186,26 @@ def test_wrists_that_friction_holds_hide_nothing_of_the_joints_that_carry_them(a
     assert found.simulation_gap["q"].shrink > 0.9
 
 
+@pytest.mark.scenario
+def test_a_recording_is_not_given_up_for_the_noise_of_a_joint_that_is_held(arm):
+    """Of its torque there is less than of the noise of its acceleration, and nothing of it is compared."""
+    robot, wide, _ = arm
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        designed = sea_ident.design_excitation(robot, starts=1, seed=1).series
+        held = holding(designed, 0)
+        recording, other = (
+            sea_ident.simulate(robot, series, periods=10, seed=seed).recording
+            for series, seed in ((held, 3), (wide, 4))
+        )
+        model = sea_ident.identify(robot, recording, period=held.period)
+        found = sea_ident.diagnose(model, recording, holdout=other, period=held.period)
+    assert found.verdict is Verdict.NONE
+    assert "The motor of shoulder_pan_joint stood" in found.text
+    assert not [text for text in found.warnings if "comes out larger than the torque" in text]
+    assert found.holdout is not None
+
+
 def test_a_slide_is_not_held_for_being_slow_beside_what_turns(laboratory):
     """A millimetre a second is a slow slide, and a milliradian a second beside a radian no motion at all."""
     robot = sea_ident.load_robot("exo_leg")
@@ -198,6 +219,12 @@ def test_a_slide_is_not_held_for_being_slow_beside_what_turns(laboratory):
         period_motions=tuple(replace(m, dtheta=m.dtheta * slower) for m in processed.period_motions),
     )
     assert stands(robot, slow).tolist() == [False, True, False]
+    # what its motor does is compared nowhere then, and its link as before
+    usual, data = (period_data(each, robot) for each in (processed, slow))
+    for e, equation in enumerate(data.equations):
+        stood = equation.joint == "knee" and equation.kind is EquationKind.MOTOR
+        assert np.all(data.left_out[:, e]) == stood
+        assert stood or np.array_equal(data.left_out[:, e], usual.left_out[:, e])
     sliding = SimpleNamespace(
         joints=[replace(j, type="prismatic" if j.name == "knee" else j.type) for j in robot.joints]
     )
