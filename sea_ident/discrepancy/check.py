@@ -1,5 +1,6 @@
 """Checks at the border: recordings that prove nothing, clipped channels, spikes, pauses."""
 
+import warnings as python_warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,8 +18,8 @@ from sea_ident.estimation.identify import visible_parameters
 from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.signs import turned_torques
-from sea_ident.exceptions import DiagnosisError
-from sea_ident.processing import ProcessedRecording
+from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
+from sea_ident.processing import ProcessedRecording, process
 from sea_ident.recordings import Recording
 from sea_ident.recordings.recording import slower_than_any
 from sea_ident.robot import Robot
@@ -154,13 +155,25 @@ def clock_in_seconds(recording: Recording | ProcessedRecording) -> None:
         )
 
 
+def as_identified(
+    recording: Recording | ProcessedRecording, processed: ProcessedRecording, robot: Robot
+) -> ProcessedRecording:
+    """The recording as `identify` processes it: with the harmonics that the data ask for, not those compared here."""
+    if isinstance(recording, ProcessedRecording):
+        return recording
+    with python_warnings.catch_warnings():
+        python_warnings.simplefilter("ignore", SeaIdentWarning)
+        return process(recording, robot, period=processed.period)
+
+
 def wrong_columns(robot: Robot, effects: Sequence[Effect], processed: ProcessedRecording) -> tuple[str, ...]:
     """What is wrong with the columns of a recording beyond doubt: nothing can be concluded from it.
 
     Args:
         robot: the robot.
         effects: the model.
-        processed: the recording, of two periods or more.
+        processed: the recording, of two periods or more, as `identify` processes it: of more harmonics accelerations
+            are noise, and signs are what that makes of them.
 
     Returns:
         Sentences; none where the columns may be as they say.

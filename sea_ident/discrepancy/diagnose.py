@@ -45,10 +45,9 @@ from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.estimation.torque_units import other_torque_units
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.one_thread import one_thread
-from sea_ident.processing import ProcessedRecording, filter_recording, process
+from sea_ident.processing import ProcessedRecording, filter_recording
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
-from sea_ident.robot import Robot
 from sea_ident.side_by_side import follows, shared
 from sea_ident.simulation import Controller
 
@@ -118,7 +117,8 @@ def diagnose(
             return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
     whole = period_data(processed, robot)
     data, notes = check.cleaned(whole, recording)
-    wrong = (*check.wrong_columns(robot, model.effects, processed), *other_torque_units(model, processed))
+    as_identified = check.as_identified(recording, processed, robot)
+    wrong = (*check.wrong_columns(robot, model.effects, as_identified), *other_torque_units(model, processed))
     notes = check.Findings((*notes.warnings, *wrong), fatal=notes.fatal or bool(wrong))
     notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
     changing = Changing.of(model, recording, data)
@@ -146,7 +146,6 @@ def diagnose(
         drifts = drifting(confirmed.bench, confirmed.final, trends, changing.temperature)
         away = (confirmed.bench, confirmed.final)
         nameless = (*unnamed(bench, selection, held, away), *stand_ins(bench, selection), *drifts)
-    as_identified = _as_identified(recording, processed, robot)
     change, change_notes = against(reference, bench, selection.final, as_identified)
     tell("simulating", 0.85)
     after = (as_identified, selection.final.fit)
@@ -343,17 +342,6 @@ def _unsearched(bench: Bench) -> Selection:
     start = settle(bench, bench.effects)
     candidates = tuple(scan(bench, start.fit, start.noise))
     return Selection(start, start, 0, (), candidates, max(sum(c.tests for c in candidates), 1))
-
-
-def _as_identified(
-    recording: Recording | ProcessedRecording, processed: ProcessedRecording, robot: Robot
-) -> ProcessedRecording:
-    """The recording as `identify` processes it: with the harmonics that the data ask for, not those compared here."""
-    if isinstance(recording, ProcessedRecording):
-        return recording
-    with python_warnings.catch_warnings():
-        python_warnings.simplefilter("ignore", SeaIdentWarning)
-        return process(recording, robot, period=processed.period)
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:

@@ -122,7 +122,7 @@ def held_out(
     holdout = processed.used_of(holdout)
     data, findings = check.cleaned(period_data(processed, bench.robot), holdout)
     warnings = [f"held-out data: {text}" for text in findings.warnings]
-    wrong = check.wrong_columns(bench.robot, bench.effects, processed)
+    wrong = check.wrong_columns(bench.robot, bench.effects, check.as_identified(holdout, processed, bench.robot))
     warnings.extend(f"held-out data: {text}" for text in wrong)
     doubted = bool(texts_of(processed.doubts, DoubtKind.POSITION))
     if findings.fatal or data.periods < 2 or wrong or doubted:

@@ -1,11 +1,23 @@
 """Checks at the border of the diagnosis."""
 
+import warnings
+
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.check import Findings, channels_move, clock_in_seconds, drowned
+from sea_ident import FourierSeries, simulate
+from sea_ident.discrepancy.check import (
+    Findings,
+    as_identified,
+    channels_move,
+    clock_in_seconds,
+    drowned,
+    wrong_columns,
+)
+from sea_ident.discrepancy.data import wide_processing
 from sea_ident.discrepancy.findings import Gap
-from sea_ident.exceptions import DiagnosisError
+from sea_ident.effects import base_effects
+from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
 from sea_ident.recordings import Recording
 from sea_ident.robot import load_robot
 
@@ -65,3 +77,17 @@ def test_time_that_is_not_in_seconds_is_refused(rate):
         DiagnosisError, match=r"a.csv: no position moves faster.*--column time=time,unit=ms. If it is in"
     ):
         clock_in_seconds(Recording(1e3 * time, columns, "a.csv"))
+
+
+@pytest.mark.parametrize("seed", [3, 4, 6, 7])
+def test_no_torque_of_an_arm_without_friction_has_the_wrong_sign(seed):
+    """Its motors take up work that others do, and noise of accelerations makes an inertia of any sign."""
+    rng = np.random.default_rng(seed)
+    a, b = 0.25 * rng.standard_normal((2, 6, 3))
+    series = FourierSeries(0.2, np.array([0.0, -1.2, 0.8, 0.2, 0.3, 0.0]), a, b)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        robot = load_robot("example:ur_description/urdf/ur5_robot.urdf")
+        recording = simulate(robot, series, periods=6, seed=seed).recording
+        processed = as_identified(recording, wide_processing(recording, robot, 5.0), robot)
+        assert wrong_columns(robot, base_effects(robot), processed) == ()

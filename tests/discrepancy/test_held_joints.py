@@ -187,13 +187,14 @@ def test_wrists_that_friction_holds_hide_nothing_of_the_joints_that_carry_them(a
 
 
 @pytest.mark.scenario
-def test_a_recording_is_not_given_up_for_the_noise_of_a_joint_that_is_held(arm):
+@pytest.mark.parametrize(("joint", "tested"), [(0, False), (5, True)])
+def test_a_recording_is_not_given_up_for_the_noise_of_a_joint_that_is_held(arm, joint, tested):
     """Of its torque there is less than of the noise of its acceleration, and nothing of it is compared."""
-    robot, wide, _ = arm
+    robot = arm[0]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeaIdentWarning)
-        designed = sea_ident.design_excitation(robot, starts=1, seed=1).series
-        held = holding(designed, 0)
+        designed, wide = (sea_ident.design_excitation(robot, starts=1, seed=seed).series for seed in (1, 2))
+        held = holding(designed, joint)
         recording, other = (
             sea_ident.simulate(robot, series, periods=10, seed=seed).recording
             for series, seed in ((held, 3), (wide, 4))
@@ -201,9 +202,10 @@ def test_a_recording_is_not_given_up_for_the_noise_of_a_joint_that_is_held(arm):
         model = sea_ident.identify(robot, recording, period=held.period)
         found = sea_ident.diagnose(model, recording, holdout=other, period=held.period)
     assert found.verdict is Verdict.NONE
-    assert "The motor of shoulder_pan_joint stood" in found.text
-    assert not [text for text in found.warnings if "comes out larger than the torque" in text]
-    assert found.holdout is not None
+    assert f"The motor of {robot.joint_names[joint]} stood" in found.text
+    drowned = [text for text in found.warnings if "comes out larger than the torque" in text]
+    # what the first joint would have told of the others is missing for all of these where it moves
+    assert (drowned == [] and found.holdout is not None) if tested else all(t.startswith("held-out") for t in drowned)
 
 
 def test_a_slide_is_not_held_for_being_slow_beside_what_turns(laboratory):
