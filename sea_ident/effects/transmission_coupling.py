@@ -17,11 +17,14 @@ SMALLEST_SHIFT = 1e-4
 """Share of the smoothing speed below which the derivative stands for the difference [-]."""
 
 LARGEST_RATIO = 1.0
-"""A fit turns the Coulomb friction over by no more than this, between joints of one kind [-], ..."""
+"""A fit begins with no more than this, between joints of one kind [-], ..."""
 
 LEVERS = (0.01, 1.0)
-"""... and between a slide and a turning joint by no more than a pinion of the first radius or a drum of the second [m].
+"""... and between a slide and a turning joint with no more than a pinion of the first radius or a drum of the second [m].
 """
+
+BEYOND_LARGEST = 1.5
+"""Times the largest ratio up to which a fit may go from there: a belt of one to one is not at the end of its range."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,8 @@ class TransmissionCoupling(Effect):
     """The motor of `joint` turns by theta + r q of another joint: its inertia and friction couple the two.
 
     Its parameters are r times what the motor has: r J, r b and r c. So the model needs no other parameter to be known
-    beforehand but r itself, around which the sign of the Coulomb friction turns.
+    beforehand but r itself, around which the sign of the Coulomb friction turns. That is a shape: where it turns says
+    r much better than how large it is, which the friction that a fit gives the motor takes a part of.
 
     Attributes:
         joint: joint of the motor.
@@ -40,6 +44,7 @@ class TransmissionCoupling(Effect):
         smoothing: speed around which the sign is smoothed [rad/s].
         ratio: r at which the Coulomb friction turns over: with the speed of the motor, not of the joint [-], or
             [rad/m] where only the other joint slides, [m/rad] where only the own does.
+        largest: ratio that a fit may begin with, either way, in the unit of `ratio`.
     """
 
     other: str | None = None
@@ -48,12 +53,15 @@ class TransmissionCoupling(Effect):
     coulomb: float | None = None
     smoothing: float = 0.01
     ratio: float = 0.0
+    largest: float = LARGEST_RATIO
 
     name: ClassVar[str] = "transmission_coupling"
     side: ClassVar[Side] = Side.BOTH
     source: ClassVar[str] = "Staubli RX-90 wrist; Gautier, Dynamic identification of robots with power model, ICRA 1997"
 
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("smoothing", "rad/s", 1e-4, 0.3),)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("ratio", "-", -BEYOND_LARGEST * LARGEST_RATIO, BEYOND_LARGEST * LARGEST_RATIO, logarithmic=False),
+    )
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:
@@ -105,8 +113,19 @@ class TransmissionCoupling(Effect):
         return Contribution(link, motor)
 
     def variants(self, state: State) -> tuple["TransmissionCoupling", ...]:
-        """As it is: its smoothing is that of the Coulomb friction of the motor."""
+        """As it is: how large it is says about where its friction turns."""
         return (self,)
+
+    @property
+    def ranges(self) -> tuple[Shape, ...]:
+        """With the ratios that joints of such kinds may have."""
+        (ratio,) = self.shapes
+        return (replace(ratio, lower=-BEYOND_LARGEST * self.largest, upper=BEYOND_LARGEST * self.largest),)
+
+    def shape_unit(self, shape: Shape, robot: Robot) -> str:
+        """That of the motor over that of the other joint."""
+        own, other = (robot.joints[k].position_unit for k in self._indices(robot))
+        return "-" if own == other else f"{own}/{other}"
 
     def planted(self, robot: Robot, ratio: float) -> FloatArray:
         """(3,) parameters of a motor of this description."""
@@ -118,7 +137,7 @@ class TransmissionCoupling(Effect):
         return i, motion.dtheta[:, i] + self.ratio * motion.dq[:, k]
 
     def anchored(self, anchor: Anchor) -> "TransmissionCoupling":
-        """With the inertia and the friction of the motor in the model, and the ratio that follows from them."""
+        """With the inertia and the friction of the motor in the model, and at first the ratio that follows from them."""
         i, _ = self._indices(anchor.robot)
         actuator = anchor.robot.joints[i].actuator
         inertia = 0.0
@@ -129,23 +148,27 @@ class TransmissionCoupling(Effect):
             reflected_inertia=inertia,
             viscous=anchor.value(f"{self.joint}.viscous_friction"),
             coulomb=anchor.value(f"{self.joint}.coulomb_friction"),
-            smoothing=self.smoothing if self.coulomb else anchor.smoothing(str(self.joint)) or self.smoothing,
+            smoothing=anchor.smoothing(str(self.joint)) or self.smoothing,
+            largest=self._largest_ratio(anchor.robot),
         )
+        if self.ratio != 0.0:
+            return known
         values = np.array([anchor.value(column.name) for column in self.columns(anchor.robot)])
-        largest = self._largest_ratio(anchor.robot)
-        return replace(known, ratio=float(np.clip(known._ratio(anchor.robot, values), -largest, largest)))
+        return replace(known, ratio=float(np.clip(known._ratio(anchor.robot, values), -known.largest, known.largest)))
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
-        """The friction; the inertia acts in `modified`."""
+        """The friction, as in the columns; the inertia acts in `modified`."""
         i, k = self._indices(robot)
-        _, viscous, coulomb = self._motor(robot)
-        ratio = self._ratio(robot, values)
+        ratio = self.ratio or self._ratio(robot, values)
+        _, viscous, coulomb = (float(value) for value in values)
+        own_coulomb = coulomb / ratio if ratio else 0.0
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            own, turned = state.dtheta[i], state.dtheta[i] + ratio * state.dq[k]
-            friction = viscous * turned + coulomb * float(np.tanh(turned / self.smoothing))
-            motor[i] += friction - viscous * own - coulomb * float(np.tanh(own / self.smoothing))
-            link[k] += ratio * friction
+            own, other = state.dtheta[i], state.dq[k]
+            turned = own + ratio * other
+            sign = float(np.tanh(turned / self.smoothing))
+            motor[i] += viscous * other + own_coulomb * (sign - float(np.tanh(own / self.smoothing)))
+            link[k] += viscous * turned + coulomb * sign
 
         return act
 
@@ -168,7 +191,7 @@ class TransmissionCoupling(Effect):
         return float(amount) / of if of > 0.0 else 0.0
 
     def _largest_ratio(self, robot: Robot) -> float:
-        """Largest r of a fit, in the unit of `ratio`."""
+        """Largest r that a fit begins with, in the unit of `ratio`."""
         own, other = (robot.joints[k] for k in self._indices(robot))
         if own.prismatic == other.prismatic:
             return LARGEST_RATIO

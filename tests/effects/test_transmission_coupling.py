@@ -182,6 +182,52 @@ def test_friction_and_inertia_of_a_simulation_turn_by_the_same_ratio(kinds, rati
     assert motor[i] == pytest.approx(friction(turned) - friction(dtheta[i]))
 
 
+def test_friction_of_a_simulation_is_that_of_the_columns():
+    """Also where a fit found another size of it than the ratio at which it turns would have."""
+    leg = sea_ident.load_robot("exo_leg")
+    effect = make_effect("transmission_coupling", "knee", other="hip", ratio=RATIO, smoothing=0.05)
+    values, motion = np.array([0.0, 0.4, 0.7]), random_motion(leg.n)
+    act, part, none = effect.torque(leg, values), effect.evaluate(State(leg, motion)), np.zeros(leg.n)
+    for t in range(len(motion)):
+        link, motor = np.zeros(leg.n), np.zeros(leg.n)
+        now = (motion.q[t], motion.dq[t], motion.theta[t], motion.dtheta[t])
+        act(SimulationState(0.0, *now, none, none), link, motor)
+        np.testing.assert_allclose(link, part.link[t] @ values, atol=1e-12)
+        np.testing.assert_allclose(motor, part.motor[t] @ values, atol=1e-12)
+
+
+def test_a_fit_keeps_the_ratio_that_it_has_found():
+    """What the amounts say of it is a beginning."""
+    robot = two_joints("revolute", "revolute")
+    names = [column.name for column in TransmissionCoupling("own", "other").columns(robot)]
+    model = dict(zip(names, (0.1, 0.2, 0.4), strict=True)) | {
+        "own.rotor_inertia": 1e-4,
+        "own.viscous_friction": 0.5,
+        "own.coulomb_friction": 0.8,
+    }
+    begun = TransmissionCoupling("own", "other").anchored(Anchor(robot, (), model))
+    assert begun.ratio == pytest.approx(0.5)
+    assert replace(begun, ratio=-0.3).anchored(Anchor(robot, (), model)).ratio == -0.3
+
+
+@pytest.mark.parametrize(
+    ("kinds", "unit", "most"),
+    [
+        (("revolute", "prismatic"), "rad/m", 150.0),
+        (("prismatic", "revolute"), "m/rad", 1.5),
+        (("revolute", "revolute"), "-", 1.5),
+        (("prismatic", "prismatic"), "-", 1.5),
+    ],
+)
+def test_ratio_of_a_fit_has_the_unit_and_the_range_of_its_joints(kinds, unit, most):
+    """A belt of one to one is not at the end of it."""
+    robot = two_joints(*kinds)
+    effect = TransmissionCoupling("own", "other").anchored(Anchor(robot, (), {}))
+    (ratio,) = effect.ranges
+    assert (ratio.name, effect.shape_unit(ratio, robot)) == ("ratio", unit)
+    assert (ratio.lower, ratio.upper) == pytest.approx((-most, most))
+
+
 @pytest.mark.parametrize(
     ("kinds", "given", "expected"),
     [

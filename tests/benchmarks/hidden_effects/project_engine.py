@@ -106,7 +106,7 @@ def planted_effects(
             yield one(compliance=c)
         case "transmission_coupling":
             other = robot.joint_names[int(s["other"])]
-            effect = make_effect(p.effect, joint, other=other, smoothing=smoothing)  # type: ignore[arg-type]
+            effect = make_effect(p.effect, joint, other=other, smoothing=smoothing, ratio=c)  # type: ignore[arg-type]
             yield PlantedEffect(effect, effect.planted(robot, c))  # type: ignore[attr-defined]
         case "encoder_offset":
             yield one(offset=c)
