@@ -20,7 +20,8 @@ LARGEST_RATIO = 1.0
 """A fit begins with no more than this, between joints of one kind [-], ..."""
 
 LEVERS = (0.01, 1.0)
-"""... and between a slide and a turning joint with no more than a pinion of the first radius or a drum of the second [m].
+"""... and between a slide and a turning joint with no more than a pinion of the first radius or a drum of the second
+[m].
 """
 
 BEYOND_LARGEST = 1.5
@@ -137,7 +138,7 @@ class TransmissionCoupling(Effect):
         return i, motion.dtheta[:, i] + self.ratio * motion.dq[:, k]
 
     def anchored(self, anchor: Anchor) -> "TransmissionCoupling":
-        """With the inertia and the friction of the motor in the model, and at first the ratio that follows from them."""
+        """With the inertia and the friction of the motor in the model, and at first the ratio that they say."""
         i, _ = self._indices(anchor.robot)
         actuator = anchor.robot.joints[i].actuator
         inertia = 0.0
