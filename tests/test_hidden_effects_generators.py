@@ -31,7 +31,7 @@ from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case, trajectories_of, truth_of
 from tests.benchmarks.hidden_effects.drawn_robots import MOST_JOINTS, drawn_name, drawn_robot
 from tests.benchmarks.hidden_effects.engine import STEP, Exact, Friction, simulate_mujoco
-from tests.benchmarks.hidden_effects.mjcf import Coupling, build_mjcf
+from tests.benchmarks.hidden_effects.mjcf import Coupling, Stages, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth, nominal_robot, nominal_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
 from tests.benchmarks.hidden_effects.sizes import OTHERWISE_BUILT, size_errors
@@ -130,15 +130,36 @@ def test_a_coupled_rotor_feels_its_carrier_as_before(joint: str, other: str) -> 
 
     def inertia(*couplings: Coupling) -> np.ndarray:
         model = build_mjcf(robot, 1e-3, couplings=couplings)
-        data, rows = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+        data = mujoco.MjData(model)
         data.qpos[:] = generator(4).uniform(-1.0, 1.0, model.nq)
         mujoco.mj_forward(model, data)
-        for row, direction in zip(rows, np.eye(model.nv), strict=True):
-            mujoco.mj_mulM(model, data, row, direction)
-        return rows
+        return Stages(robot, model, couplings).inertia(data)
 
     np.testing.assert_allclose(inertia(Coupling(joint, other, 0.0)), inertia(), rtol=1e-9, atol=1e-12)
     assert not np.allclose(inertia(Coupling(joint, other, 0.1)), inertia(), rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize(("joint", "other"), [("hip", "knee"), ("knee", "hip"), ("ankle", "knee"), ("knee", "ankle")])
+def test_a_coupled_motor_feels_the_other_joint_and_the_other_joint_feels_it(joint: str, other: str) -> None:
+    """Whichever of them carries the other, or none; and what accelerates is what the matrix of inertias says."""
+    import mujoco
+
+    robot = drawn_truth("exo_leg", generator(3)).robot
+    couplings = (Coupling(joint, other, 0.5),)
+    model = build_mjcf(robot, 1e-3, couplings=couplings)
+    data, stages = mujoco.MjData(model), Stages(robot, model, couplings)
+    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = generator(4).uniform(-1.0, 1.0, (3, model.nv))
+    mujoco.mj_forward(model, data)
+    alone = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, alone)
+    k, m = (mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in (f"{joint} rotor", other))
+    actuator = robot.joints[robot.index(joint)].actuator
+    assert actuator is not None
+    added = stages.inertia(data) - alone
+    assert added[k, m] == pytest.approx(0.5 * 0.8 * actuator.rotor_inertia * actuator.gear_ratio, rel=0.05)
+    np.testing.assert_allclose(added, added.T, atol=1e-12)
+    force = alone @ data.qacc  # with all that depends on the speed
+    np.testing.assert_allclose(stages.inertia(data) @ stages.accelerations(data), force, atol=1e-9)
 
 
 LEFT_OVER = {

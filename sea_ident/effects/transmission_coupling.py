@@ -28,6 +28,11 @@ BEYOND_LARGEST = 1.5
 """Times the largest ratio up to which a fit may go from there: a belt of one to one is not at the end of its range."""
 
 
+TRIED = (0.0, -0.3, 0.3, -1.0, 1.0)
+"""Ratios that a search begins with, as shares of the largest. What a large one does is no multiple of what a small one
+does: the motor turns the other way half of the time."""
+
+
 @dataclass(frozen=True)
 class TransmissionCoupling(Effect):
     """The motor of `joint` turns by theta + r q of another joint: its inertia and friction couple the two.
@@ -114,8 +119,8 @@ class TransmissionCoupling(Effect):
         return Contribution(link, motor)
 
     def variants(self, state: State) -> tuple["TransmissionCoupling", ...]:
-        """As it is: how large it is says about where its friction turns."""
-        return (self,)
+        """With ratios from a small one, about which its amounts say more, to that of a belt."""
+        return tuple(replace(self, ratio=share * self._largest_ratio(state.robot)) for share in TRIED)
 
     @property
     def ranges(self) -> tuple[Shape, ...]:

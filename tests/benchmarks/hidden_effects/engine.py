@@ -15,7 +15,7 @@ from sea_ident.motion import FourierSeries, Motion
 from sea_ident.regressor import inverse_dynamics
 from tests.benchmarks.hidden_effects import forms
 from tests.benchmarks.hidden_effects.case import FloatArray, Noise, Planted
-from tests.benchmarks.hidden_effects.mjcf import Coupling, Flexibility, Payload, build_mjcf
+from tests.benchmarks.hidden_effects.mjcf import Coupling, Flexibility, Payload, Stages, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth
 
 STEP = 1e-3
@@ -136,7 +136,9 @@ def simulate_mujoco(
     duration = periods * series.period
     rng = np.random.default_rng(np.random.SeedSequence([seed, 77]))
 
-    model = build_mjcf(robot, step, *_structure(planted, truth))
+    payloads, flexibilities, couplings = _structure(planted, truth)
+    model = build_mjcf(robot, step, payloads, flexibilities, couplings)
+    stages = Stages(robot, model, couplings)
     for p in planted:
         if p.effect == "base_tilt":
             model.opt.gravity[:] = pin.exp3(p.size * np.array([p.shape["x"], p.shape["y"], 0.0])) @ model.opt.gravity
@@ -164,7 +166,7 @@ def simulate_mujoco(
     theta_reference, torque_reference = reference_torque(truth, series, time)
     rate_reference = (np.roll(theta_reference, -1, 0) - np.roll(theta_reference, 1, 0)) / (2 * step)
 
-    inertia = _motor_inertias(model, data, series, iq, it, gear, elastic)
+    inertia = _motor_inertias(stages, model, data, series, iq, it, gear, elastic)
     bandwidth = 2.0 * pi * 4.0
     kp = [m * bandwidth**2 for m in inertia]
     kd = [2.0 * 0.8 * m * bandwidth for m in inertia]
@@ -178,7 +180,7 @@ def simulate_mujoco(
     for p in planted:
         forms.bind(p, truth, hooks, wide, step, duration if course is None else course)
     pushes = _pushes(planted, model, series.period, duration)
-    link_inertia = _link_inertias(model, data, series, iq)
+    link_inertia = _link_inertias(stages, model, data, series, iq)
 
     nv = model.nv
     start_q, start_v = series.evaluate(np.zeros(1))[0], series.evaluate(np.zeros(1), 1)[0]
@@ -199,7 +201,7 @@ def simulate_mujoco(
     smoothing, ramp, spread = friction.smoothing, friction.form == "ramp", friction.jitter
     jitter_speed = friction.jitter_speed
     half = 0.5 * step
-    qpos, qvel, qacc, applied = data.qpos, data.qvel, data.qacc, data.qfrc_applied
+    qpos, qvel, applied = data.qpos, data.qvel, data.qfrc_applied
     forward_dynamics = mujoco.mj_forward
     count = (total - first) // stride
     log = np.empty((count, 8, n))
@@ -293,7 +295,7 @@ def simulate_mujoco(
         qvel[:] = at
         applied[:] = force
         forward_dynamics(model, data)
-        a = qacc.tolist()
+        a = stages.accelerations(data).tolist()
         before = v
         v = [vi + step * ai for vi, ai in zip(v, a, strict=True)]
         for i in range_n:
@@ -354,28 +356,24 @@ def _pushes(planted, model, period, duration):  # type: ignore[no-untyped-def]
     return pushes
 
 
-def _motor_inertias(model, data, series, iq, it, gear, elastic):  # type: ignore[no-untyped-def]
+def _motor_inertias(stages, model, data, series, iq, it, gear, elastic):  # type: ignore[no-untyped-def]
     """What a torque at each motor accelerates at least, on the joint side [kg m2]."""
     smallest = np.full(len(iq), np.inf)
-    full = np.zeros((model.nv, model.nv))
     for q in series.evaluate(np.linspace(0.0, series.period, 7)):
         data.qpos[:] = 0.0
         data.qpos[iq] = q
         mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, data, full)
-        inverse = np.linalg.inv(full)
+        inverse = np.linalg.inv(stages.inertia(data))
         smallest = np.minimum(smallest, [gear[i] ** 2 / inverse[k, k] for i, k in enumerate(it)])
     return [float(m if e else 0.9 * m) for m, e in zip(smallest, elastic, strict=True)]
 
 
-def _link_inertias(model, data, series, iq):  # type: ignore[no-untyped-def]
+def _link_inertias(stages, model, data, series, iq):  # type: ignore[no-untyped-def]
     smallest = np.full(len(iq), np.inf)
-    full = np.zeros((model.nv, model.nv))
     for q in series.evaluate(np.linspace(0.0, series.period, 7)):
         data.qpos[:] = 0.0
         data.qpos[iq] = q
         mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, data, full)
-        inverse = np.linalg.inv(full)
+        inverse = np.linalg.inv(stages.inertia(data))
         smallest = np.minimum(smallest, [1.0 / inverse[k, k] for k in iq])
     return [0.8 * float(m) for m in smallest]

@@ -319,7 +319,7 @@ def _parallel_spring(p, truth, i, hooks, wide, step, duration):  # type: ignore[
 
 
 def _coupled(p, truth, i, hooks, wide, step, duration):  # type: ignore[no-untyped-def]
-    """A stage that turns with theta_i + r q_j; its inertia is a tendon's in the MJCF, its friction follows here."""
+    """A stage that turns with theta_i + r q_j; its inertia is of `Stages`, its friction follows here."""
     hooks[i].turned = (int(p.shape["other"]), p.size)
 
 

@@ -83,7 +83,8 @@ def build_mjcf(
         timestep: [s].
         payloads: masses to add.
         flexibilities: flexible links.
-        couplings: rotors that turn with two motors.
+        couplings: motors whose stage turns with another joint too; their rotors lack its inertia, which is of
+            `Stages`.
 
     Returns:
         The model; joint names are those of `robot.extended_model`.
@@ -95,8 +96,6 @@ def build_mjcf(
         children[int(model.parents[k])].append(k)
     flexible = {f.joint: f for f in flexibilities}
     coupled = {f"{c.joint} rotor" for c in couplings}
-    gears = {rotor.joint: float(rotor.gear_ratio) for rotor in robot.rotors}
-    spins = {rotors[k].joint: float(model.inertias[k].inertia[2, 2]) for k in rotors}
 
     def inertial(mass: float, centre: FloatArray, about_centre: FloatArray) -> str:
         i = about_centre
@@ -157,28 +156,67 @@ def build_mjcf(
     grounded = "".join(rotor(c, 0.1, 0.7 * float(model.inertias[c].inertia[2, 2]), np.zeros(3))
                        for c in children[0] if c in rotors)  # fmt: skip
     world = grounded + "".join(link(c) for c in children[0] if c not in rotors)
-    tendons = "".join(
-        f'<fixed name="{c.joint} {c.other}" armature="{COUPLED_SHARE * spins[c.joint] * gears[c.joint] ** 2!r}">'
-        + "".join(f'<joint joint="{name}" coef="{amount!r}"/>' for name, amount in _turning(model, c, gears).items())
-        + "</fixed>"
-        for c in couplings
-    )
     gravity = _text(model.gravity.linear)
     text = (
         f'<mujoco><compiler angle="radian"/><option timestep="{timestep!r}" gravity="{gravity}" integrator="Euler">'
         f'<flag contact="disable" constraint="disable"/></option>'
-        f"<worldbody>{world}</worldbody>{f'<tendon>{tendons}</tendon>' if tendons else ''}</mujoco>"
+        f"<worldbody>{world}</worldbody></mujoco>"
     )
     return mujoco.MjModel.from_xml_string(text)
 
 
-def _turning(model: pin.Model, coupling: Coupling, gears: dict[str, float]) -> dict[str, float]:
+class Stages:
+    """What turns with its own joint and with another link: inertias beside those of the bodies of MuJoCo.
+
+    MuJoCo's own means, a tendon with an armature, leaves out whatever inertia couples joints of which none carries the
+    other, for it has no place in its matrix.
+
+    Args:
+        robot: the robot.
+        model: MuJoCo's, built with the same couplings.
+        couplings: the motors.
+    """
+
+    def __init__(self, robot: Robot, model: mujoco.MjModel, couplings: tuple[Coupling, ...]) -> None:
+        extended = robot.extended_model
+        self._amounts, inverse = np.zeros((len(couplings), model.nv)), np.zeros(len(couplings))
+        for k, coupling in enumerate(couplings):
+            gear = next(float(rotor.gear_ratio) for rotor in robot.rotors if rotor.joint == coupling.joint)
+            spin = extended.inertias[extended.getJointId(f"{coupling.joint} rotor")].inertia[2, 2]
+            inverse[k] = 1.0 / (COUPLED_SHARE * float(spin) * gear**2)
+            for name, amount in _turning(extended, coupling, gear).items():
+                joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+                self._amounts[k, model.jnt_dofadr[joint]] += amount
+        self._model, self._inverse = model, np.diag(inverse)
+
+    def __len__(self) -> int:
+        return len(self._amounts)
+
+    def inertia(self, data: mujoco.MjData) -> FloatArray:
+        """(nv, nv) inertia of the bodies and these."""
+        full = np.zeros((self._model.nv, self._model.nv))
+        mujoco.mj_fullM(self._model, data, full)
+        if not len(self):
+            return full
+        return full + self._amounts.T @ np.linalg.inv(self._inverse) @ self._amounts
+
+    def accelerations(self, data: mujoco.MjData) -> FloatArray:
+        """(nv,) with them, from those without: the matrix inversion lemma, for inertias of a few ways to turn."""
+        if not len(self):
+            return np.asarray(data.qacc)
+        alone = np.zeros_like(self._amounts)
+        mujoco.mj_solveM(self._model, data, alone, self._amounts)
+        shared = np.linalg.solve(self._inverse + self._amounts @ alone.T, self._amounts @ data.qacc)
+        return np.asarray(data.qacc - shared @ alone)
+
+
+def _turning(model: pin.Model, coupling: Coupling, gear: float) -> dict[str, float]:
     """What the stage of a coupled rotor turns by with every joint, in space and over its gear.
 
     It turns with the links that carry it as the rotor does, where their axes stay parallel to its own: what is hidden
     is how it turns with another joint, not that it no longer feels its carrier.
     """
-    gear, data = gears[coupling.joint], model.createData()
+    data = model.createData()
     amounts = {f"{coupling.joint} rotor": 1.0 / gear, coupling.other: coupling.ratio}
     pin.forwardKinematics(model, data, pin.neutral(model))
     names = list(model.names)
