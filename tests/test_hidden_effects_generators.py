@@ -31,7 +31,7 @@ from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case, trajectories_of, truth_of
 from tests.benchmarks.hidden_effects.drawn_robots import MOST_JOINTS, drawn_name, drawn_robot
 from tests.benchmarks.hidden_effects.engine import STEP, Exact, Friction, simulate_mujoco
-from tests.benchmarks.hidden_effects.mjcf import Coupling, Stages, build_mjcf
+from tests.benchmarks.hidden_effects.mjcf import COUPLED_SHARE, Coupling, Stages, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth, nominal_robot, nominal_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
 from tests.benchmarks.hidden_effects.sizes import OTHERWISE_BUILT, size_errors
@@ -156,14 +156,13 @@ def test_a_coupled_motor_feels_the_other_joint_and_the_other_joint_feels_it(join
     actuator = robot.joints[robot.index(joint)].actuator
     assert actuator is not None
     added = stages.inertia(data) - alone
-    assert added[k, m] == pytest.approx(0.5 * 0.8 * actuator.rotor_inertia * actuator.gear_ratio, rel=0.05)
+    assert added[k, m] == pytest.approx(0.5 * COUPLED_SHARE * actuator.rotor_inertia * actuator.gear_ratio, rel=0.05)
     np.testing.assert_allclose(added, added.T, atol=1e-12)
     force = alone @ data.qacc  # with all that depends on the speed
     np.testing.assert_allclose(stages.inertia(data) @ stages.accelerations(data), force, atol=1e-9)
 
 
 LEFT_OVER = {
-    "transmission_coupling": 0.4,
     "torque_constant": 0.5,
     "torque_constant_drift": 0.1,
     "backlash": 0.1,
@@ -196,6 +195,9 @@ def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.En
     added = [
         (p.effect.anchored(anchor), p.values) for p in planted_effects(planted, truth, SMOOTHING, series.period, 1)
     ]
+    if entry.effect == "transmission_coupling":  # with the friction of the true motor, and most of its inertia
+        friction_of_motor = planted.size * np.array([truth.viscous[joint], truth.coulomb[joint]])
+        added = [(e, np.concatenate([COUPLED_SHARE * values[:1], friction_of_motor])) for e, values in added]
     signals = [effect for effect, _ in added if isinstance(effect, SignalEffect)]
     columns = [(effect, values) for effect, values in added if not isinstance(effect, SignalEffect)]
     scale = np.sqrt(np.mean(exact.tau_motor**2, axis=0))

@@ -240,15 +240,21 @@ def test_how_large_a_push_is_counts_where_its_point_is_told() -> None:
 
 
 def test_a_coupling_has_the_friction_of_its_motor() -> None:
-    """In the engine whose motors have it; the project's plants that of the description."""
+    """In the engine whose motors have it, with most of their inertia; the project's plants that of the description."""
     truth = truth_of(draw_case(1, "none", 0))
+    actuator = truth.robot.joints[1].actuator
+    assert actuator is not None
+    assert actuator.rotor_inertia is not None
+    inertia = -0.1 * actuator.rotor_inertia * actuator.gear_ratio**2
     coupled = replace(RIPPLE, effect="transmission_coupling", size=-0.1, shape={"other": 2.0})
-    name = "knee.transmission_coupling_coulomb_from_ankle"
-    for engine in ("mujoco", "project"):
+    stem = "knee.transmission_coupling"
+    for engine, share in (("mujoco", 0.8), ("project", 1.0)):
         known = true_parameters(coupled, replace(draw_case(1, "none", 0), engine=engine), truth)
-        same = known[name] == pytest.approx(-0.1 * truth.coulomb[1])
+        same = known[f"{stem}_coulomb_from_ankle"] == pytest.approx(-0.1 * truth.coulomb[1])
         assert bool(same) is (engine == "mujoco")
-        assert not any("inertia" in each or "smoothing" in each for each in known)
+        assert known[f"{stem}_inertia_from_ankle"] == pytest.approx(share * inertia)
+        assert known[f"{stem}_ratio"] == -0.1
+        assert not any("smoothing" in each for each in known)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 from sea_ident.effects import Effect, Side
 from sea_ident.robot import Robot
 from tests.benchmarks.hidden_effects.case import Case, FloatArray, Planted
+from tests.benchmarks.hidden_effects.mjcf import COUPLED_SHARE
 from tests.benchmarks.hidden_effects.plants import Truth, nominal_robot
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
 
@@ -17,9 +18,8 @@ OTHERWISE_BUILT = ("link_flexibility",)
 NOT_OF_THE_EFFECT = {
     "presliding_friction": ("",),
     "backlash": ("", "_cubic"),
-    "transmission_coupling": ("_inertia",),
 }
-"""Parameters that are friction, stiffness or inertia of the base model, by what follows the name of the effect."""
+"""Parameters that are friction or stiffness of the base model, by what follows the name of the effect."""
 
 OF_THE_RECORD = ("torque_constant", "torque_constant_drift", "torque_saturation")
 """Effects at the motor that are shares of its torque, or of what the record has of it, and no torque of their own."""
@@ -69,8 +69,9 @@ def true_parameters(planted: Planted, case: Case, truth: Truth) -> dict[str, flo
         away = _centre(robot, planted.joint) - _centre(nominal_robot(case.robot), planted.joint)
         known |= {f"{stem}_point_{axis}": float(distance) for axis, distance in zip("xyz", away, strict=True)}
     if planted.effect == "transmission_coupling" and case.engine == "mujoco":
-        # there with the friction that the motor has, not with that of its description
+        # there with what the motor has, not with what its description says, and with most of its inertia
         i, other = robot.index(str(planted.joint)), robot.joint_names[int(planted.shape["other"])]
+        known[f"{stem}_inertia_from_{other}"] *= COUPLED_SHARE
         for kind, friction in (("viscous", truth.viscous), ("coulomb", truth.coulomb)):
             known[f"{stem}_{kind}_from_{other}"] = planted.size * float(friction[i])
     left_out = {f"{stem}{label}" for label in (*HOW_IT_TURNS, *NOT_OF_THE_EFFECT.get(planted.effect, ()))}
