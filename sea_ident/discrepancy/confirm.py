@@ -15,6 +15,7 @@ from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.taken_up import taken_up
+from sea_ident.effects import Side
 from sea_ident.side_by_side import side_by_side
 
 FAR = 6
@@ -63,8 +64,9 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     """Take out the effects that only the samples near reversals speak for.
 
     What the others say must stand out of the scatter of the periods as well: friction that differs from pass to pass
-    does so beyond the samples that are left out, and has another mean over the passes of every recording. Stiction
-    stays that every pass shows where its motor is let go.
+    does so beyond the samples that are left out, and has another mean over the passes of every recording. What was
+    found there is the best of all that could act at a motor. Stiction stays that every pass shows where its motor is
+    let go.
 
     Args:
         bench: the recording.
@@ -80,6 +82,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     final = settle_again(away, selection.final.fit)
     steps = flat_steps(away, final)
     first = len(final.fit.effects) - selection.added
+    at_motors = sum(candidate.effect.side is Side.MOTOR for candidate in selection.candidates)
 
     def is_weak(position: int) -> bool:
         others = [e for k, e in enumerate(final.fit.effects) if k != position]
@@ -87,7 +90,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         loss = less.statistic - final.fit.statistic
         columns = max(len(final.fit.effects[position].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
-        by_chance = max(p_value, scatter_p(steps, less.whitened - final.fit.whitened))
+        by_chance = max(p_value, max(at_motors, 1) * scatter_p(steps, less.whitened - final.fit.whitened))
         if by_chance <= FAMILY_LEVEL:
             visible = torque_change(away, final.fit, less) >= SMALLEST_SHARE
             if visible or taken_up(away, less, final.fit, final.noise, position):

@@ -48,7 +48,11 @@ PUSHES_BACK = 0.2
 
 BEYOND_FORM = 2.0
 """Times the torque that is left without a name by which a push must exceed it: forms that are not those of the library
-leave something at certain times of a period too, and a push fits there [-]."""
+leave something at certain times of a period too, and a push fits there [-], ..."""
+
+BEYOND_DOUBT = 0.02
+"""... unless it leaves less than this share of the excess without it: no other form is so alike a push that comes and
+goes, and without it nothing else is told [-]."""
 
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
@@ -318,7 +322,7 @@ class _Elimination:
         # nor what beside the others ended at the end of its range
         needed = needed and not at_a_bound(effect)
         if is_push(effect):
-            needed = needed and own > BEYOND_FORM * self.nameless
+            needed = needed and (own > BEYOND_FORM * self.nameless or fit.excess < BEYOND_DOUBT * without.excess)
             # a push comes and goes: nothing but another push can cancel it
             needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
         needed = needed and not bends_another(bench, fit, position)

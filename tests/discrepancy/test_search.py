@@ -13,7 +13,7 @@ from sea_ident.discrepancy.exchange import Outdone
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, own_torque, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, LARGE_TORQUE, visible_changes
-from sea_ident.discrepancy.search import Selection, _eliminate, _lost, search, still_needed
+from sea_ident.discrepancy.search import Selection, _eliminate, _Elimination, _lost, search, still_needed
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
@@ -243,6 +243,22 @@ def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(la
     assert kept(2.0, []) == 0
     assert kept(2.0, [ripple]) == 1
     assert kept(0.01, []) == 1
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("amplitude", "stays"), [(0.0, True), (0.3, False)])
+def test_a_push_that_leaves_nearly_nothing_is_none_of_another_form(laboratory, amplitude, stays):
+    """However small it is beside what has no name at another joint: nothing else would be told without it."""
+    planted = [
+        ("external_force", "ankle", [0.0, 0.0, 2.0], {"start": 0.4, "stop": 0.9}),
+        ("torque_ripple", "hip", [amplitude, 0.0], {"order": 4.0}),
+    ]
+    bench = laboratory.bench(laboratory.record(planted, periods=5))
+    now = settle(bench, (*bench.effects, make_effect("external_force", "ankle", start=0.4, stop=0.9)))
+    position = len(bench.effects)
+    for nameless in (0.0, own_torque(bench, now.fit, position)):
+        tried = _Elimination(bench, now, 100, nameless)(position)
+        assert (tried.p_value < 1e-100) is (stays or not nameless)
 
 
 @pytest.mark.parametrize("first", [0, 1])
