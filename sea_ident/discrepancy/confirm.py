@@ -65,8 +65,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
 
     What the others say must stand out of the scatter of the periods as well: friction that differs from pass to pass
     does so beyond the samples that are left out, and has another mean over the passes of every recording. What was
-    found there is the best of all that could act at a motor. Stiction stays that every pass shows where its motor is
-    let go.
+    found is at the motor where it stands out by most. Stiction stays that every pass shows where its motor is let go.
 
     Args:
         bench: the recording.
@@ -82,7 +81,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     final = settle_again(away, selection.final.fit)
     steps = flat_steps(away, final)
     first = len(final.fit.effects) - selection.added
-    at_motors = sum(candidate.effect.side is Side.MOTOR for candidate in selection.candidates)
+    motors = len({c.effect.joint for c in selection.candidates if c.effect.side is Side.MOTOR})
 
     def is_weak(position: int) -> bool:
         others = [e for k, e in enumerate(final.fit.effects) if k != position]
@@ -90,7 +89,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
         loss = less.statistic - final.fit.statistic
         columns = max(len(final.fit.effects[position].columns(away.robot)), 1)
         p_value = significance(loss, columns, selection.tests, less, final.noise)
-        by_chance = max(p_value, max(at_motors, 1) * scatter_p(steps, less.whitened - final.fit.whitened))
+        by_chance = max(p_value, max(motors, 1) * scatter_p(steps, less.whitened - final.fit.whitened))
         if by_chance <= FAMILY_LEVEL:
             visible = torque_change(away, final.fit, less) >= SMALLEST_SHARE
             if visible or taken_up(away, less, final.fit, final.noise, position):

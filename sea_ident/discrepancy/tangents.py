@@ -24,6 +24,11 @@ SAMPLES_PER_HARMONIC = 4
 """Samples of the derivatives of the dynamics for every harmonic that is compared: what folds back into these is three
 times as high, where a motion has next to nothing [-]."""
 
+STEP = 2e-5
+"""Step by which the change with a shape is told, in the coordinates of `moved`: the ratio of a transmission between a
+slide and a turning joint has a range of hundreds of radians per metre, and turns friction over within a hundredth [-].
+"""
+
 SIGNALS_KEPT = 12
 """Errors of the encoders of which the deflections are kept."""
 
@@ -121,7 +126,7 @@ class Tangents(Columns):
                 # `moved` counts in ranges of the amount
                 out[:, :, k], slopes[:, k] = ((shape.upper - shape.lower) * part for part in (torque, slope))
                 continue
-            low, high = (moved_within(effects, position, shape, step) for step in (-1e-3, 1e-3))
+            low, high = (moved_within(effects, position, shape, step) for step in (-STEP, STEP))
             state, apart = self.state(effects), distance(low[position], high[position], shape)
             for j, pair in enumerate(zip(low, high, strict=True)):
                 if pair[0] is pair[1]:

@@ -11,7 +11,7 @@ from sea_ident.effects import corrected_motion, effect_classes, make_effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.effects.signal import SignalEffect
 
-STEP = 5e-4
+STEP = 5e-5
 """Of the differences, in the coordinates of `moved`; not the one that the analytic side uses."""
 
 WITH_SHAPES = sorted(
