@@ -8,7 +8,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Anchor, Effect, Shape
-from sea_ident.effects.signal import SignalEffect, with_joint
+from sea_ident.effects.load import SPRING_LAW
+from sea_ident.effects.signal import SignalEffect, rate_of, with_joint
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -24,20 +25,24 @@ LEAST = 0.1
 class LinkFlexibility(SignalEffect):
     """The bodies stand at q - c tau_spring, where q is what the link encoder shows.
 
-    The compliance bends without inertia of its own. The spring of the model is the whole of both compliances, between
-    motor and bodies: it is what tau_spring follows from in the description. With the law of the part before the
-    encoder, whose deflection is measured, tau_spring follows from that: it is what a model without this effect finds.
+    The compliance bends without inertia of its own, and by the damping of the spring too: at a few hertz that is some
+    hundredths of what it bends, out of phase with the rest. The spring of the model is the whole of both compliances,
+    between motor and bodies: it is what tau_spring follows from in the description. With the law of the part before
+    the encoder, whose deflection is measured, tau_spring follows from that: it is what a model without this effect
+    finds.
 
     Attributes:
         joint: joint at which it acts.
         compliance: c, behind the encoder [rad/(N m)].
         stiffness: K1 of the part before the encoder, None to take the whole spring of the description [N m/rad].
         cubic_stiffness: K3 of that part [N m/rad3].
+        damping: D of that part [N m s/rad].
     """
 
     compliance: float = 0.0
     stiffness: float | None = None
     cubic_stiffness: float | None = None
+    damping: float | None = None
 
     name: ClassVar[str] = "link_flexibility"
     depth: ClassVar[int] = 1
@@ -51,19 +56,21 @@ class LinkFlexibility(SignalEffect):
 
     def anchored(self, anchor: Anchor) -> "LinkFlexibility":
         """With the spring of the model; the bodies stay where they are."""
-        linear = anchor.value(f"{self.joint}.spring_stiffness")
+        linear, cubic, damping = (anchor.value(f"{self.joint}.{name}") for name in SPRING_LAW)
         if self.stiffness is None:
-            return replace(self, stiffness=linear, cubic_stiffness=anchor.value(f"{self.joint}.spring_stiffening"))
-        before = self.stiffness
-        now = linear * (1.0 + self.compliance * before)  # the whole is softer by what bends behind the encoder
+            return replace(self, stiffness=linear, cubic_stiffness=cubic, damping=damping)
+        before, bends = self.stiffness, self.compliance * self.stiffness
+        now = linear * (1.0 + bends)  # the whole is softer by what bends behind the encoder
         if not (before > 0.0 and now > 0.0):
             return self
-        ratio = now / before
+        # what the bodies were moved by the other terms so far was not left for the spring of the whole to explain
+        moved = bends / (1.0 + bends)
         return replace(
             self,
-            compliance=self.compliance / ratio,
+            compliance=self.compliance * before / now,
             stiffness=now,
-            cubic_stiffness=ratio * (self.cubic_stiffness or 0.0),
+            cubic_stiffness=cubic * (1.0 + bends) ** 3 + (self.cubic_stiffness or 0.0) * moved,
+            damping=damping * (1.0 + bends) + (self.damping or 0.0) * moved,
         )
 
     @property
@@ -79,12 +86,12 @@ class LinkFlexibility(SignalEffect):
         d, c = motion.deflection[:, i], self.compliance
         rate, bend = motion.deflection_rate[:, i], motion.ddtheta[:, i] - motion.ddq[:, i]
         if self.stiffness is not None:
-            linear, cubic = self.stiffness, self.cubic_stiffness or 0.0
+            linear, cubic, damping = self.stiffness, self.cubic_stiffness or 0.0, self.damping or 0.0
             whole = d + c * (linear * d + cubic * d**3)
             share = 1.0 + c * (linear + 3.0 * cubic * d**2)
             whole_rate, whole_bend = share * rate, share * bend + c * 6.0 * cubic * d * rate**2
         else:
-            linear, cubic = self._whole_spring(robot)
+            linear, cubic, damping = self._whole_spring(robot)
             whole, most = d, np.abs(d) / LEAST
             for _ in range(NEWTON_STEPS):
                 slope = linear + 3.0 * cubic * whole**2
@@ -94,13 +101,15 @@ class LinkFlexibility(SignalEffect):
             share = np.maximum(1.0 - c * (linear + 3.0 * cubic * whole**2), LEAST)
             whole_rate = rate / share
             whole_bend = (bend + c * 6.0 * cubic * whole * whole_rate**2) / share
+            damping /= max(1.0 - c * linear, LEAST) ** 2
+        lag = c * damping
         return with_joint(
             robot,
             motion,
             i,
-            motion.theta[:, i] - whole,
-            motion.dtheta[:, i] - whole_rate,
-            motion.ddtheta[:, i] - whole_bend,
+            motion.theta[:, i] - whole - lag * rate,
+            motion.dtheta[:, i] - whole_rate - lag * bend,
+            motion.ddtheta[:, i] - whole_bend - lag * (rate_of(motion.time, bend) if lag else 0.0),
         )
 
     def read(self, robot: Robot, motion: Motion) -> Motion:
@@ -121,11 +130,11 @@ class LinkFlexibility(SignalEffect):
         out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]
         return out
 
-    def _whole_spring(self, robot: Robot) -> tuple[float, float]:
+    def _whole_spring(self, robot: Robot) -> tuple[float, float, float]:
         spring = robot.spring(str(self.joint))
         if spring.stiffness is None:
             raise EffectError(
                 f"the effect {self.name!r} at {self.joint!r} needs the stiffness of its spring: give stiffness=..., "
                 "or put it into the annotation"
             )
-        return spring.stiffness, spring.cubic_stiffness or 0.0
+        return spring.stiffness, spring.cubic_stiffness or 0.0, spring.damping or 0.0

@@ -108,6 +108,15 @@ def ahead(time: FloatArray, values: FloatArray, by: float) -> FloatArray:
     return np.asarray(spline(np.clip(time + by, time[0], time[-1])), dtype=np.float64)
 
 
+def rate_of(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Rate of change of values (N,) at the uniform times (N,) [s]: of a closed period exactly, as a Fourier series."""
+    if is_closed(values):
+        step = float(time[-1] - time[0]) / (len(time) - 1)
+        spectrum = np.fft.rfft(values) * 2j * np.pi * np.fft.rfftfreq(len(time), step)
+        return np.asarray(np.fft.irfft(spectrum, n=len(time)), dtype=np.float64)
+    return np.asarray(CubicSpline(time, values)(time, 1), dtype=np.float64)
+
+
 def with_joint(robot: Robot, motion: Motion, joint: int, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Motion:
     """The motion with other link samples (N,) of one joint; where it is rigid, the motor follows."""
     new = {

@@ -104,19 +104,23 @@ def test_friction_builds_up_over_more_than_a_part_of_what_passes_differ_by(
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize(("compliance", "within"), [(0.0005, 0.02), (0.0025, 0.05)])
-def test_how_far_a_link_bends(laboratory, compliance, within):
+@pytest.mark.parametrize(
+    ("joint", "compliance", "within"), [("knee", 0.0005, 0.015), ("knee", 0.0025, 0.05), ("hip", 0.0008, 0.01)]
+)
+def test_how_far_a_link_bends(laboratory, joint, compliance, within):
     """Half of the whole compliance behind the encoder, and the spring that is found without the effect is another."""
     shape = {"compliance": compliance}
-    bench = laboratory.bench(laboratory.record([("link_flexibility", "knee", [], shape)], periods=10))
+    bench = laboratory.bench(laboratory.record([("link_flexibility", joint, [], shape)], periods=10))
     now = settle(bench, bench.effects)
     tried = next(
         c.effect
         for c in scan(bench, now.fit, now.noise)
-        if (c.effect.name, c.effect.joint) == ("link_flexibility", "knee")
+        if (c.effect.name, c.effect.joint) == ("link_flexibility", joint)
     )
     found = refitted(bench, now.fit.effects, tried, (), now.noise, now.fit.parameters)
     again = settle_again(bench, found).fit
     assert again.effects[-1].compliance == pytest.approx(compliance, rel=within)
     # in the model, the spring is what lies between motor and bodies
-    assert again.parameters["knee.spring_stiffness"] == pytest.approx(200.0, rel=0.02)
+    spring = laboratory.leg.spring(joint)
+    assert again.parameters[f"{joint}.spring_stiffness"] == pytest.approx(spring.stiffness, rel=0.02)
+    assert again.parameters[f"{joint}.spring_damping"] == pytest.approx(spring.damping, rel=0.12)

@@ -1,0 +1,62 @@
+"""A link that bends behind its encoder: the way back from what that shows, and the law of the spring beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sea_ident
+from sea_ident.effects import Anchor, make_effect
+from sea_ident.motion import FourierSeries
+
+COMPLIANCE = 0.0015
+LAW = {"stiffness": 570.0, "cubic_stiffness": 15e3, "damping": 4.8}
+PERIOD = 4.0
+
+
+def bending(samples=400):
+    """What the encoders of a leg show while its hip bends, and where the thigh is (N,), with its first two rates."""
+    leg = sea_ident.load_robot("exo_leg")
+    rng = np.random.default_rng(5)
+    shown, bent = (
+        FourierSeries(1.0 / PERIOD, rng.normal(0.0, size, 3), *rng.normal(0.0, size, (2, 3, 3))) for size in (0.1, 0.02)
+    )
+    time = np.arange(samples) * PERIOD / samples
+    links, between = ([series.evaluate(time, k) for k in range(4)] for series in (shown, bent))
+    theta, dtheta, ddtheta = (link + d for link, d in zip(links[:3], between[:3], strict=True))
+    motion = replace(shown.motion(time), theta=theta, dtheta=dtheta, ddtheta=ddtheta)
+    d, *rates = (each[:, 0] for each in between)
+    torque = LAW["stiffness"] * d + LAW["cubic_stiffness"] * d**3 + LAW["damping"] * rates[0]
+    slope = LAW["stiffness"] + 3.0 * LAW["cubic_stiffness"] * d**2
+    torque_rate = slope * rates[0] + LAW["damping"] * rates[1]
+    torque_bend = slope * rates[1] + 6.0 * LAW["cubic_stiffness"] * d * rates[0] ** 2 + LAW["damping"] * rates[2]
+    bodies = [shown.evaluate(time, k)[:, 0] - COMPLIANCE * t for k, t in enumerate((torque, torque_rate, torque_bend))]
+    return leg, motion, torque, bodies
+
+
+def test_the_link_is_where_the_torque_of_the_spring_bends_it_to_its_damping_included():
+    leg, motion, torque, bodies = bending()
+    effect = make_effect("link_flexibility", "hip", compliance=COMPLIANCE, **LAW)
+    found = effect.corrected(leg, motion)
+    for name, right in zip(("q", "dq", "ddq"), bodies, strict=True):
+        np.testing.assert_allclose(getattr(found, name)[:, 0], right, atol=1e-9 * np.abs(right).max())
+    signals = {"q": found.q, "tau_spring": np.stack([torque, *np.zeros((2, len(torque)))], axis=1)}
+    back = effect.measured(leg, motion.time, signals)
+    np.testing.assert_allclose(back["q"][:, 0], motion.q[:, 0], atol=1e-12)
+
+
+def test_the_law_of_the_spring_before_the_encoder_follows_from_that_of_the_whole():
+    """However wrong it was while the whole was fitted: what it moved the bodies by is not left for the whole."""
+    leg, motion, torque, _ = bending()
+    wrong = {"stiffness": 560.0, "cubic_stiffness": -4e3, "damping": 1.0}
+    effect = make_effect("link_flexibility", "hip", compliance=COMPLIANCE, **wrong)
+    bodies = effect.corrected(leg, motion)
+    w, rate = bodies.deflection[:, 0], bodies.deflection_rate[:, 0]
+    whole = np.linalg.lstsq(np.stack([w, w**3, rate], axis=1), torque, rcond=None)[0]
+    names = ("hip.spring_stiffness", "hip.spring_stiffening", "hip.spring_damping")
+    found = effect.anchored(Anchor(leg, (effect,), dict(zip(names, map(float, whole), strict=True))))
+    assert found.stiffness == pytest.approx(LAW["stiffness"], rel=0.01)
+    assert found.cubic_stiffness == pytest.approx(LAW["cubic_stiffness"], rel=0.15)
+    assert found.damping == pytest.approx(LAW["damping"], rel=0.05)
+    # the bodies bend as far as before by the first of them
+    assert found.compliance * found.stiffness == pytest.approx(COMPLIANCE * wrong["stiffness"], rel=1e-12)
