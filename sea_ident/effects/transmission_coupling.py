@@ -27,7 +27,6 @@ LEVERS = (0.01, 1.0)
 BEYOND_LARGEST = 1.5
 """Times the largest ratio up to which a fit may go from there: a belt of one to one is not at the end of its range."""
 
-
 TRIED = (0.0, -0.3, 0.3, -1.0, 1.0)
 """Ratios that a search begins with, as shares of the largest. What a large one does is no multiple of what a small one
 does: the motor turns the other way half of the time."""

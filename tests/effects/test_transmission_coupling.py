@@ -246,3 +246,12 @@ def test_a_fit_bounds_the_ratio_by_levers_where_kinds_differ(kinds, given, expec
     values = dict(zip((c.name for c in effect.columns(robot)), effect.planted(robot, given), strict=True))
     model = {"own.rotor_inertia": 1e-4, "own.viscous_friction": 0.5, "own.coulomb_friction": 0.8}
     assert effect.anchored(Anchor(robot, (effect,), values | model)).ratio == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("kinds", "largest"), [(("revolute", "prismatic"), 100.0), (("revolute", "revolute"), 1.0)])
+def test_a_search_begins_with_ratios_up_to_that_of_a_belt_either_way(kinds, largest):
+    """What a large one does is no multiple of what a small one does: from nothing a fit does not get there."""
+    robot = two_joints(*kinds)
+    begun = TransmissionCoupling("own", "other").variants(State(robot, random_motion(robot.n)))
+    ratios = sorted(each.ratio / largest for each in begun)
+    assert ratios == pytest.approx([-1.0, -0.3, 0.0, 0.3, 1.0])
