@@ -1,5 +1,6 @@
 """Spin of the rotors from the motion of the links that carry them, when it is not as the drawing says."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -8,13 +9,17 @@ import pinocchio as pin
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action
-from sea_ident.effects.base import Column, Effect
+from sea_ident.effects.base import Anchor, Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
 
 ROUNDING = 1e-9
 """Share of the torque that turns a rotor by itself below which its coupling comes from the digits of a description."""
+
+MOST = 10.0
+"""Times the inertia of the rotor: where its axis lies, its carrier turns it once at most, and one that is drawn to lie
+across shows a part of that. What turns it many times is a transmission [-]."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,10 @@ class RotorCoupling(Effect):
 
     Attributes:
         joint: joint that the rotor drives.
+        inertia: of the rotor in the model, None where that is not known [kg m2].
     """
+
+    inertia: float | None = None
 
     name: ClassVar[str] = "rotor_coupling"
     side: ClassVar[Side] = Side.BOTH
@@ -56,6 +64,15 @@ class RotorCoupling(Effect):
         if max(np.abs(link).max(initial=0.0), np.abs(motor).max(initial=0.0)) < ROUNDING * np.abs(own).max(initial=0.0):
             return Contribution(np.zeros_like(link), np.zeros_like(motor))
         return Contribution(link, motor)
+
+    def anchored(self, anchor: Anchor) -> "RotorCoupling":
+        """With the inertia of the rotor in the model."""
+        rotor = anchor.robot.rotors[self._rotor(anchor.robot)]
+        return replace(self, inertia=anchor.value(f"{rotor.rotor_group}.rotor_inertia"))
+
+    def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
+        """Whether its carrier can turn the rotor that far."""
+        return not self.inertia or bool(abs(values[0]) < MOST * self.inertia)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""

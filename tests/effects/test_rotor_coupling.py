@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sea_ident.base_parameters import random_motion
-from sea_ident.effects import State, make_effect
+from sea_ident.effects import Anchor, State, make_effect
 from sea_ident.robot import load_robot
 
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
@@ -41,3 +41,14 @@ def test_coupling_of_a_planar_rotor_is_its_spin_times_the_acceleration_of_the_li
     whole = before + spin * motion.ddtheta[:, place]
     np.testing.assert_allclose(link[:, :place], np.stack([whole, whole], axis=1), rtol=1e-9)
     np.testing.assert_allclose(link[:, place:], 0.0, atol=1e-12)
+
+
+def test_a_carrier_turns_its_rotor_no_more_than_a_few_times():
+    """What couples two joints by more is a transmission, which has the same columns but for a small one."""
+    leg = load_robot("exo_leg")
+    free = make_effect("rotor_coupling", "knee")
+    assert free.plausible(np.array([1.0]), {})
+    found = free.anchored(Anchor(leg, (), {"motor.rotor_inertia": 2.2e-5}))
+    # a gear that turns the other way, and a belt that adds a third of another joint after a gear of 100
+    assert found.plausible(np.array([-4.4e-5]), {})
+    assert not found.plausible(np.array([7e-4]), {})
