@@ -9,7 +9,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.untold import BesideFit, in_base, widened
-from sea_ident.effects import Effect, Side, spring_effects
+from sea_ident.effects import Anchor, Effect, Side, spring_effects
 from sea_ident.estimation import Model
 from sea_ident.estimation.identify import default_estimator, doubted_anew, identify_observed, with_values
 from sea_ident.estimation.knowledge import regular_covariance
@@ -43,9 +43,8 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
     """
     law = set(spring_effects(model.robot))
     known = (*model.effects, *model.spring_effects)
-    effects = tuple(
-        effect for effect in with_open_shapes(fit, known) if effect.side is not Side.SPRING or effect not in law
-    )
+    found = with_open_shapes(model.robot, fit, known)
+    effects = tuple(effect for effect in found if effect.side is not Side.SPRING or effect not in law)
     try:
         return identified_beside(model.robot, processed, effects, fit)
     except SeaIdentError as error:
@@ -77,8 +76,12 @@ def identified_beside(robot: Robot, processed: ProcessedRecording, effects: Sequ
         return doubted_anew(with_what_it_misses(own, observations, fit), found)
 
 
-def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The effects of a fit, with the shapes that it leaves open as in the effects that are known."""
+def with_open_shapes(robot: Robot, fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects of a fit, with the shapes that it leaves open as in the effects that are known.
+
+    What takes over such a shape from another effect follows: friction that builds up over a distance tells nothing of
+    the speed at which the sign in its place turns over, and takes away that very sign.
+    """
     effects = list(fit.effects)
     usual = {(type(effect), effect.joint): effect for effect in known}
     for k, (position, shape) in enumerate(fit.free_shapes):
@@ -86,7 +89,10 @@ def with_open_shapes(fit: Fit, known: Sequence[Effect]) -> tuple[Effect, ...]:
         before = usual.get((type(effect), effect.joint))
         if before is not None and fit.std(len(fit.columns) + k) > OPEN:
             effects[position] = replace(effect, **{shape.name: getattr(before, shape.name)})
-    return tuple(effects)
+    if tuple(effects) == fit.effects:
+        return fit.effects
+    anchor = Anchor(robot, tuple(effects), fit.parameters)
+    return tuple(effect.anchored(anchor) for effect in effects)
 
 
 def with_what_it_misses(model: Model, observations: Observations, fit: Fit) -> Model:

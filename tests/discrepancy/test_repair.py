@@ -1,6 +1,7 @@
 """A repaired model is a model like any other: saved, read, simulated, exported, diagnosed again; one of every kind."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import sea_ident
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.discrepancy.repair import repaired_model, with_open_shapes
 from sea_ident.discrepancy.settle import settle
 from sea_ident.discrepancy.untold import in_base
 from sea_ident.effects import base_effects, make_effect, spring_effects
@@ -212,3 +213,28 @@ def test_friction_that_acts_only_beside_reversals_comes_from_the_diagnosis(leg, 
     assert both[name].std < 0.05 * alone[name].std
     # what both see of a motor counts once
     assert both["hip.coulomb_friction"].std > 0.9 * alone["hip.coulomb_friction"].std
+
+
+def test_presliding_takes_away_the_sign_that_the_model_has(laboratory):
+    """It says nothing of the speed at which that turns over: where this stays as it was, both stay."""
+    leg = laboratory.leg
+    bench = laboratory.bench(laboratory.record([("presliding_friction", "knee", [1.2], {"displacement": 0.003})]))
+    start = settle(bench, bench.effects)
+    fit = bench.fit((*start.fit.effects, make_effect("presliding_friction", "knee", displacement=0.003)), start.noise)
+    other = tuple(
+        replace(effect, smoothing=0.03) if effect.joint == "knee" and "smoothing" in effect.shape_values else effect
+        for effect in fit.effects
+    )
+    moved = bench.fit(bench.anchored(other, fit.parameters), start.noise, start=fit.parameters)
+    smoothing = [
+        {
+            e.name: e.smoothing
+            for e in effects
+            if e.joint == "knee" and e.name in ("coulomb_friction", "presliding_friction")
+        }
+        for effects in (moved.effects, with_open_shapes(leg, moved, bench.effects))
+    ]
+    assert smoothing == [
+        {"coulomb_friction": 0.03, "presliding_friction": 0.03},
+        {"coulomb_friction": 0.01, "presliding_friction": 0.01},
+    ]
