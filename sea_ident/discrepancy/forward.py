@@ -168,6 +168,8 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
     remembers = any(isinstance(planted.effect, MemoryEffect) for planted in built.effects)
     lead = samples if remembers else min(ceil(LEAD / period * samples), samples)
     first = samples - lead
+    # torques as the record has them, by what the model says of the drives, and no currents
+    plant = replace(built.plant, torque_constant=np.full(model.robot.n, np.nan))
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
         run = simulate(
@@ -178,7 +180,7 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
             jitter=FrictionJitter.none(),
             controller=command.driving(model, processed),
             friction=built.friction,
-            plant=built.plant,
+            plant=plant,
             effects=built.effects,
             rate=samples / period,
             start=actual(model, processed)[0][first : first + 1],
@@ -189,7 +191,4 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
     theta = q.copy()
     for i in robot.elastic_indices:
         theta[:, i] = recorded.columns[f"theta_{robot.joint_names[i]}"]
-    torque = run.tau_motor
-    if all(recorded.has("tau_motor", name) for name in robot.joint_names):
-        torque = recorded.channel("tau_motor", robot.joint_names)
-    return {"q": q, "theta": theta, "tau": torque}
+    return {"q": q, "theta": theta, "tau": recorded.channel("tau_motor", robot.joint_names)}
