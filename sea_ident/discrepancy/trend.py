@@ -34,7 +34,11 @@ SURE = 3.0
 """Standard deviations by which a value of a trend that is over soon must differ from zero, its course free [-], ..."""
 
 NOT_AT_ALL = 1.0
-"""... and of any other: a rate that may as well be none is not told, whatever the course explains [-]."""
+"""... and of any other: a rate that may as well be none is not told [-], ..."""
+
+CERTAIN = 1e-6
+"""... unless what drifts is a matter of chance with no more than this probability: how it went at first may be known no
+better than to its own size, and that it went is plain all the same."""
 
 LEVEL = 1e-4
 """Probability that a trend must have by chance at most to be one. The scatter of periods is no normal distribution far
@@ -215,7 +219,10 @@ def compare_periods(
         column_p = best_trend(numbers, directions, middle, noise).p_value
     trends = tuple(_trend(numbers, chosen, k, directions, middle, change, values_of) for k in range(len(chosen)))
     soon = [_is_over_soon(bench, c.direction) for c in chosen]
-    told = [trend.known(SURE if over else NOT_AT_ALL) for trend, over in zip(trends, soon, strict=True)]
+    told = [
+        trend.known(SURE if over else NOT_AT_ALL) or (not over and trend.p_value < CERTAIN)
+        for trend, over in zip(trends, soon, strict=True)
+    ]
     if not all(told):
         notes += tuple(
             _not_told(bench, trend, over) for trend, over, known in zip(trends, soon, told, strict=True) if not known
