@@ -10,7 +10,7 @@ from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, torque_changes
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, too_short, torque_changes
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, SMALLEST_SHARE, next_effect
@@ -82,8 +82,12 @@ def searched_beside_reversals(bench: Bench, confirmed: Confirmed) -> tuple[Bench
         step = _next(near, now, before.start.fit, scan(near, now.fit, now.noise))
         if step is None or step[0].effects[-1].name not in LIVE_BESIDE_REVERSALS:
             break
+        settled = settle_again(near, settle_again(near, step[0]).fit)
+        # it may have become shorter in its own noise floor
+        if too_short(near, settled.fit.effects[-1]):
+            break
         added.append(step[1])
-        now = settle_again(near, settle_again(near, step[0]).fit)
+        now = settled
     if not added:
         return bench, replace(confirmed, beside=(near, now))
     start = settle_again(near, before.start.fit)

@@ -19,6 +19,7 @@ from sea_ident.discrepancy.judge import (
     is_push,
     own_torque,
     significance,
+    too_short,
     torque_change,
     torque_changes,
 )
@@ -196,8 +197,11 @@ def _lost(now: Settled, before: Settled, added: int, candidates: Sequence[Candid
 
 
 def _possible(bench: Bench, now: Settled, added: int) -> bool:
-    """Whether all effects that were added are possible together."""
-    return all(possible(bench, now.fit, now.noise, -k) for k in range(1, added + 1))
+    """Whether all effects that were added are possible together, and none has become too short to be shown."""
+    return all(
+        possible(bench, now.fit, now.noise, -k) and not too_short(bench, now.fit.effects[-k])
+        for k in range(1, added + 1)
+    )
 
 
 def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: Collection[Key]) -> Settled:
@@ -319,8 +323,8 @@ class _Elimination:
         # as where it was added: what the model bends by without it says nothing of its size
         shows = visible >= SMALLEST_SHARE or taken_up(bench, without, fit, noise, position)
         needed = shows and 2.0 * own >= SMALLEST_SHARE and physical(bench, fit, position)
-        # nor what beside the others ended at the end of its range
-        needed = needed and not at_a_bound(effect)
+        # nor what beside the others ended at the end of its range, or is over sooner by now than can be shown
+        needed = needed and not at_a_bound(effect) and not too_short(bench, effect)
         if is_push(effect):
             needed = needed and (own > BEYOND_FORM * self.nameless or fit.excess < BEYOND_DOUBT * without.excess)
             # a push comes and goes: nothing but another push can cancel it

@@ -91,6 +91,13 @@ def test_the_samples_beside_reversals_show_it(sticking):
 
 
 @pytest.mark.scenario
+def test_what_became_too_short_in_its_own_noise_floor_is_not_added(sticking, monkeypatch):
+    bench, _ = sticking
+    monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.too_short", lambda bench, effect: True)
+    assert searched_beside_reversals(bench, unsearched(bench))[1].selection.added == 0
+
+
+@pytest.mark.scenario
 def test_what_only_the_slow_samples_show_is_found_once_the_rest_is_explained(
     sticking, jittery, laboratory, monkeypatch
 ):

@@ -434,3 +434,21 @@ def test_a_search_that_goes_on_knows_what_was_outdone_before(unequal, monkeypatc
     assert outdone.items() <= again.tried.items()
     search(bench, bench.effects, replace(found, tried={}))
     assert known[-1] == {}
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("short", [True, False])
+def test_what_became_too_short_while_the_model_settled_is_not_kept(laboratory, monkeypatch, short):
+    """Friction that builds up over less than the passes differ by, which was more before the noise floor was right."""
+    planted = [("presliding_friction", "knee", [1.2], {"displacement": 0.003})]
+    bench = laboratory.bench(laboratory.record(planted, periods=8))
+    monkeypatch.setitem(search.__globals__, "too_short", lambda bench, effect: short)
+    assert named(search(bench, bench.effects)) == (set() if short else {("presliding_friction", "knee")})
+
+
+def test_what_became_too_short_is_not_needed(unequal, monkeypatch):
+    bench, selection = unequal
+    position, now = len(bench.effects), selection.final
+    for short in (False, True):
+        monkeypatch.setitem(_Elimination.__call__.__globals__, "too_short", lambda bench, effect, s=short: s)
+        assert (_Elimination(bench, now, selection.tests, 0.0)(position).p_value == 1.0) == short

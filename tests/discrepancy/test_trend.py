@@ -262,9 +262,7 @@ def test_what_is_over_within_a_period_has_no_rate_and_no_name(laboratory, time_c
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize(
-    ("deviations", "p_value", "named"), [(0.9, 1e-5, False), (1.1, 1e-5, True), (0.9, 1e-7, True)]
-)
+@pytest.mark.parametrize(("deviations", "p_value", "named"), [(0.9, 1e-5, False), (1.1, 1e-5, True), (0.9, 1e-7, True)])
 def test_a_rate_within_its_own_deviation_is_not_told(laboratory, monkeypatch, deviations, p_value, named):
     """Periods that differ as a drift makes them, p 1e-4, with a rate of -0.006 +- 0.007 1/min: nothing to name.
 
