@@ -91,10 +91,14 @@ def test_the_samples_beside_reversals_show_it(sticking):
 
 
 @pytest.mark.scenario
-def test_what_became_too_short_in_its_own_noise_floor_is_not_added(sticking, monkeypatch):
+@pytest.mark.parametrize("short", [True, False])
+def test_what_became_too_short_in_its_own_noise_floor_is_not_added(sticking, monkeypatch, short):
     bench, _ = sticking
-    monkeypatch.setattr("sea_ident.discrepancy.beside_reversals.too_short", lambda bench, effect: True)
-    assert searched_beside_reversals(bench, unsearched(bench))[1].selection.added == 0
+    module = "sea_ident.discrepancy.beside_reversals"
+    monkeypatch.setattr(f"{module}._let_go_late", lambda near, now, most: (now, []))
+    monkeypatch.setattr(f"{module}.too_short", lambda bench, effect: short)
+    found = searched_beside_reversals(bench, unsearched(bench))[1].selection
+    assert named(found) == ([] if short else [("stribeck_friction", "knee")])
 
 
 @pytest.mark.scenario
