@@ -9,7 +9,7 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Anchor, Effect, Shape
 from sea_ident.effects.load import SPRING_LAW
-from sea_ident.effects.signal import SignalEffect, rate_of, with_joint
+from sea_ident.effects.signal import SignalEffect, below, rate_of, with_joint
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -101,15 +101,17 @@ class LinkFlexibility(SignalEffect):
             share = np.maximum(1.0 - c * (linear + 3.0 * cubic * whole**2), LEAST)
             whole_rate = rate / share
             whole_bend = (bend + c * 6.0 * cubic * whole * whole_rate**2) / share
-            damping /= max(1.0 - c * linear, LEAST) ** 2
-        lag = c * damping
+            # of the part before the encoder
+            stiffer = 1.0 / max(1.0 - c * linear, LEAST)
+            linear, damping = stiffer * linear, stiffer**2 * damping
+        lag = self._lag(motion.time, np.stack([rate, bend]), c * damping, linear)
         return with_joint(
             robot,
             motion,
             i,
-            motion.theta[:, i] - whole - lag * rate,
-            motion.dtheta[:, i] - whole_rate - lag * bend,
-            motion.ddtheta[:, i] - whole_bend - lag * (rate_of(motion.time, bend) if lag else 0.0),
+            motion.theta[:, i] - whole - lag[0],
+            motion.dtheta[:, i] - whole_rate - lag[1],
+            motion.ddtheta[:, i] - whole_bend - lag[2],
         )
 
     def read(self, robot: Robot, motion: Motion) -> Motion:
@@ -129,6 +131,18 @@ class LinkFlexibility(SignalEffect):
         out["q"] = signals["q"].copy()
         out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]
         return out
+
+    def _lag(self, time: FloatArray, rates: FloatArray, lag: float, stiffness: float) -> FloatArray:
+        """(3, N) what the damping bends, with its rates, from the first two rates (2, N) of the deflection.
+
+        Up to the frequency at which the damper becomes stiffer than the spring: beyond it, three derivatives of a
+        position are noise more than anything.
+        """
+        if lag == 0.0:
+            return np.zeros((3, len(time)))
+        corner = abs(self.compliance * stiffness / lag)
+        slow = [below(time, each, corner) for each in rates]
+        return lag * np.stack([*slow, rate_of(time, slow[1])])
 
     def _whole_spring(self, robot: Robot) -> tuple[float, float, float]:
         spring = robot.spring(str(self.joint))

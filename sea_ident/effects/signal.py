@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action
@@ -115,6 +116,22 @@ def rate_of(time: FloatArray, values: FloatArray) -> FloatArray:
         spectrum = np.fft.rfft(values) * 2j * np.pi * np.fft.rfftfreq(len(time), step)
         return np.asarray(np.fft.irfft(spectrum, n=len(time)), dtype=np.float64)
     return np.asarray(CubicSpline(time, values)(time, 1), dtype=np.float64)
+
+
+def below(time: FloatArray, values: FloatArray, corner: float) -> FloatArray:
+    """What of values (N,) at the uniform times (N,) [s] is slower than a corner frequency [rad/s], in phase.
+
+    Of a closed period its harmonics up to there, of any other signal what a Butterworth filter leaves.
+    """
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    if is_closed(values):
+        spectrum = np.fft.rfft(values)
+        spectrum[2.0 * np.pi * np.fft.rfftfreq(len(time), step) > corner] = 0.0
+        return np.asarray(np.fft.irfft(spectrum, n=len(time)), dtype=np.float64)
+    share = corner * step / np.pi
+    if share >= 1.0:
+        return values
+    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values), dtype=np.float64)
 
 
 def with_joint(robot: Robot, motion: Motion, joint: int, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Motion:

@@ -7,6 +7,7 @@ import pytest
 
 import sea_ident
 from sea_ident.effects import Anchor, make_effect
+from sea_ident.effects.signal import below, rate_of
 from sea_ident.motion import FourierSeries
 
 COMPLIANCE = 0.0015
@@ -60,3 +61,43 @@ def test_the_law_of_the_spring_before_the_encoder_follows_from_that_of_the_whole
     assert found.damping == pytest.approx(LAW["damping"], rel=0.05)
     # the bodies bend as far as before by the first of them
     assert found.compliance * found.stiffness == pytest.approx(COMPLIANCE * wrong["stiffness"], rel=1e-12)
+
+
+def test_beyond_the_corner_of_the_spring_the_damping_bends_nothing():
+    """Three derivatives of a position are noise there: what a fast deflection bends is that of the spring alone."""
+    leg, motion, _, _ = bending()
+    corner = LAW["stiffness"] / LAW["damping"] * PERIOD / (2.0 * np.pi)  # 75.6 harmonics
+    with_damping = make_effect("link_flexibility", "hip", compliance=COMPLIANCE, **LAW)
+    without = make_effect("link_flexibility", "hip", compliance=COMPLIANCE, **LAW | {"damping": 0.0})
+    for harmonic, bends in ((75, True), (76, False)):
+        assert (harmonic < corner) == bends
+        rate = 2.0 * np.pi * harmonic / PERIOD
+        wave = 1e-4 * np.stack([f(rate * motion.time) for f in (np.sin, np.cos, lambda x: -np.sin(x))])
+        fast = [getattr(motion, name).copy() for name in ("theta", "dtheta", "ddtheta")]
+        for k, each in enumerate(fast):
+            each[:, 0] += rate**k * wave[k]
+        shaken = replace(motion, theta=fast[0], dtheta=fast[1], ddtheta=fast[2])
+        lag = [
+            (with_damping.corrected(leg, each).ddq - without.corrected(leg, each).ddq)[:, 0]
+            for each in (motion, shaken)
+        ]
+        expected = COMPLIANCE * LAW["damping"] * rate**3 * 1e-4 if bends else 0.0
+        assert np.abs(lag[1] - lag[0]).max() == pytest.approx(expected, rel=1e-3, abs=1e-6)
+
+
+def test_what_is_slower_than_a_corner_is_left_in_phase():
+    """Of a period its harmonics, exactly; of any other signal what a filter without delay leaves."""
+    time = np.arange(1000) * 0.005
+    slow, fast = np.sin(2.0 * np.pi * 0.8 * time), np.sin(2.0 * np.pi * 40.0 * time)
+    np.testing.assert_allclose(below(time, slow + fast, 2.0 * np.pi * 10.0), slow, atol=1e-12)
+    begun = slice(0, 700)  # does not close
+    both = (slow + fast)[begun]
+    np.testing.assert_allclose(below(time[begun], both, 2.0 * np.pi * 10.0)[50:-50], slow[begun][50:-50], atol=0.02)
+    np.testing.assert_array_equal(below(time[begun], both, 1e9), both)
+
+
+def test_rate_of_a_period_and_of_any_other_signal():
+    time = np.arange(1000) * 0.005
+    wave, rate = np.sin(2.0 * np.pi * 0.8 * time), 1.6 * np.pi * np.cos(2.0 * np.pi * 0.8 * time)
+    np.testing.assert_allclose(rate_of(time, wave), rate, atol=1e-10)
+    np.testing.assert_allclose(rate_of(time[:700], wave[:700]), rate[:700], atol=1e-4)
