@@ -101,3 +101,23 @@ def test_rate_of_a_period_and_of_any_other_signal():
     wave, rate = np.sin(2.0 * np.pi * 0.8 * time), 1.6 * np.pi * np.cos(2.0 * np.pi * 0.8 * time)
     np.testing.assert_allclose(rate_of(time, wave), rate, atol=1e-10)
     np.testing.assert_allclose(rate_of(time[:700], wave[:700]), rate[:700], atol=1e-4)
+
+
+def test_a_description_gives_the_spring_of_the_whole():
+    """The damping to first order: it bends the whole, of which the encoder shows the part before it."""
+    leg, motion, _, _ = bending()
+    spring, compliance = leg.spring("hip"), 5e-4
+    w, rate = motion.deflection[:, 0], motion.deflection_rate[:, 0]
+    lag = compliance * spring.damping * rate
+    shown = motion.q.copy()
+    shown[:, 0] += compliance * (spring.stiffness * w + spring.cubic_stiffness * w**3) + lag
+    rates = [rate_of(motion.time, shown[:, 0])]
+    rates.append(rate_of(motion.time, rates[0]))
+    dq, ddq = motion.dq.copy(), motion.ddq.copy()
+    dq[:, 0], ddq[:, 0] = rates
+    seen = replace(motion, q=shown, dq=dq, ddq=ddq)
+    found = make_effect("link_flexibility", "hip", compliance=compliance).corrected(leg, seen)
+    for name, order in (("q", 0), ("dq", 1), ("ddq", 2)):
+        bent = [lag, rate_of(motion.time, lag), rate_of(motion.time, rate_of(motion.time, lag))][order]
+        wrong = getattr(found, name)[:, 0] - getattr(motion, name)[:, 0]
+        assert np.std(wrong) < 0.1 * np.std(bent)
