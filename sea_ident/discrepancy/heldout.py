@@ -16,7 +16,13 @@ from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
-from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals, held_still, not_compared_at
+from sea_ident.discrepancy.standing import (
+    BESIDE_REVERSALS,
+    compared_beside_reversals,
+    held_still,
+    no_slower_than,
+    not_compared_at,
+)
 from sea_ident.discrepancy.transfer import Transfer, far_behind, transfer
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
@@ -133,7 +139,7 @@ def held_out(
     elif bench.data.caution == BESIDE_REVERSALS:
         data = compared_beside_reversals(data)
     # what the recording does not tell would leave so much there that nothing else could be tested
-    data = not_compared_at(data, held_still(bench.data))
+    data = no_slower_than(not_compared_at(data, held_still(bench.data)), bench.data)
     found = tried(Bench(data, bench.effects), selection, processed.source)
     gap = gap_of(found.bench, found.before, found.after, found.noise)
     lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench), held_still(data))

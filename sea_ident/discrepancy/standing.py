@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sea_ident.discrepancy.data import EquationKind, PeriodData
+from sea_ident.discrepancy.data import MOST_LEFT_OUT, EquationKind, PeriodData
+from sea_ident.effects import Side
 from sea_ident.estimation.observations import NEARLY_ALWAYS
 from sea_ident.reversals import UNCERTAIN_SIGN
 
@@ -53,6 +54,28 @@ def not_compared_at(data: PeriodData, joints: Collection[str]) -> PeriodData:
         return data
     left_out = data.left_out.copy()
     left_out[:, [equation.joint in joints for equation in data.equations]] = True
+    return replace(data, left_out=left_out)
+
+
+def no_slower_than(data: PeriodData, other: PeriodData) -> PeriodData:
+    """The same periods without samples in which a motor is slower than in all that are compared of another recording.
+
+    At which speed friction turns over, the other does not tell then, and a model of it may have it wrong by any factor:
+    what that leaves where a motor lingers at such a speed says nothing of what was found.
+
+    Args:
+        data: the periods.
+        other: the recording that the model is from.
+
+    Returns:
+        The periods; equations of motors that hardly ever go faster keep what they leave out.
+    """
+    left_out = data.left_out.copy()
+    for e, equation in enumerate(data.equations):
+        if equation.kind is not EquationKind.LINK:
+            slow = np.abs(data.motion.dtheta[:, equation.index]) < other.slowest[equation.joint, Side.MOTOR]
+            if np.mean(slow | left_out[:, e]) <= MOST_LEFT_OUT:
+                left_out[:, e] |= slow
     return replace(data, left_out=left_out)
 
 

@@ -1,9 +1,17 @@
 """Where a motor stands: what stays uncompared beside a reversal."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from sea_ident.discrepancy.data import EquationKind
-from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals, longest_standing
+from sea_ident.discrepancy.standing import (
+    BESIDE_REVERSALS,
+    compared_beside_reversals,
+    longest_standing,
+    no_slower_than,
+)
 
 
 def test_what_stands_stays_out_and_what_is_only_slow_is_compared(jittery):
@@ -36,3 +44,22 @@ def test_the_joint_of_which_most_is_not_compared(jittery):
     rows = data.left_out[:, motors[found.joint]]
     assert np.all(np.abs(data.motion.dtheta[rows, index]) <= found.speed)
     assert found.speed in np.abs(data.motion.dtheta[rows, index])
+
+
+@pytest.mark.parametrize(("share", "out"), [(0.4, True), (0.7, False)])
+def test_what_is_slower_than_all_that_another_recording_compares_is_left_out(jittery, share, out):
+    """Where that leaves something to compare; of links, which have no friction there, nothing."""
+    data = jittery
+    left_out = data.left_out.copy()
+    limits = {}
+    for e, equation in enumerate(data.equations):
+        if equation.kind is not EquationKind.LINK:
+            speed = np.abs(data.motion.dtheta[:, equation.index])
+            limits[e] = float(np.quantile(speed, share))
+            left_out[:, e] |= speed < limits[e]
+    found = no_slower_than(data, replace(data, left_out=left_out))
+    for e, equation in enumerate(data.equations):
+        expected = data.left_out[:, e]
+        if out and e in limits:
+            expected = expected | (np.abs(data.motion.dtheta[:, equation.index]) < limits[e])
+        assert np.array_equal(found.left_out[:, e], expected)
