@@ -445,6 +445,25 @@ def test_what_drifts_does_so_by_the_clock_however_long_a_recording_is(monkeypatc
         assert asked[0] == case.periods * case.period
 
 
+def test_what_drifts_in_the_record_does_so_by_the_clock_too(leg: gap.Gauge) -> None:
+    """Torque constants of a motor are no torque of it: its sensors have them."""
+    drift = Planted("torque_constant_drift", "knee", "library", 0.5, {"kind": 0.0}, 0.01, 0.01)
+    whole = leg.exact
+    half = len(whole.motion) // 2
+    course = 2.0 * float(whole.motion.time[-1])
+    names, series = ("q", "dq", "ddq", "theta", "dtheta", "ddtheta"), whole.motion
+    part = replace(
+        whole,
+        motion=Motion(series.time[:half], *(getattr(series, name)[:half] for name in names)),
+        tau_motor=whole.tau_motor[:half],
+        course=course,
+    )
+    told = [sensors.signals(each, leg.truth, (drift,))["tau_motor"] for each in (replace(whole, course=course), part)]
+    np.testing.assert_array_equal(told[0][:half], told[1])
+    # half of the way
+    assert whole.tau_motor[-1, 1] / told[0][-1, 1] == pytest.approx(1.25, abs=0.01)
+
+
 @pytest.mark.scenario
 def test_a_link_that_swings_fast_on_its_spring_is_followed() -> None:
     truth, series = nominal_truth("centauro"), draw_trajectory("centauro", 5.0, generator(9, 12))

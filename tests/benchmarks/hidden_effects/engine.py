@@ -34,6 +34,7 @@ class Exact:
             friction [N m].
         temperature: (N, n) of the motors [degC].
         period: [s].
+        course: time that what drifts takes for all of its course, however long a recording is [s].
     """
 
     motion: Motion
@@ -41,6 +42,7 @@ class Exact:
     tau_spring: FloatArray
     temperature: FloatArray
     period: float
+    course: float
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,7 @@ def simulate_mujoco(
     stride = round(1.0 / (rate * step))
     first, total = settle * per_period, (settle + periods) * per_period
     duration = periods * series.period
+    course = duration if course is None else course
     rng = np.random.default_rng(np.random.SeedSequence([seed, 77]))
 
     payloads, flexibilities, couplings = _structure(planted, truth)
@@ -178,7 +181,7 @@ def simulate_mujoco(
     hooks = [forms.Hooks() for _ in range(n)]
     wide: list[forms.Wide] = []
     for p in planted:
-        forms.bind(p, truth, hooks, wide, step, duration if course is None else course)
+        forms.bind(p, truth, hooks, wide, step, course)
     pushes = _pushes(planted, model, series.period, duration)
     link_inertia = _link_inertias(stages, model, data, series, iq)
 
@@ -319,7 +322,7 @@ def simulate_mujoco(
         else:
             temperature[:, i] += (6.0 + i) * (1.0 - np.exp(-clock / (0.2 * (i + 2) * duration)))
     motion = Motion(clock, *(np.ascontiguousarray(log[:, k]) for k in range(6)))
-    return Exact(motion, log[:, 6].copy(), log[:, 7].copy(), temperature, series.period)
+    return Exact(motion, log[:, 6].copy(), log[:, 7].copy(), temperature, series.period, course)
 
 
 def _structure(

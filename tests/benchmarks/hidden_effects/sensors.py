@@ -23,7 +23,6 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
     time, names = exact.motion.time, truth.robot.joint_names
     q, theta, tau = exact.motion.q.copy(), exact.motion.theta.copy(), exact.tau_motor.copy()
     rigid = ~np.array(truth.robot.elastic, dtype=bool)
-    duration = float(time[-1])
     period = round(exact.period / float(time[1] - time[0]))
     for p in planted:
         i = 0 if p.joint is None else names.index(p.joint)
@@ -41,7 +40,7 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
             case "common_torque_constant":
                 tau /= 1.0 + p.size
             case "torque_constant_drift":
-                course = trend(p.shape["kind"], duration)
+                course = trend(p.shape["kind"], exact.course)
                 tau[:, i] /= 1.0 + p.size * np.array([course(float(t)) for t in time])
             case "crosstalk":
                 tau[:, i] += p.size * exact.tau_motor[:, int(p.shape["other"])]
