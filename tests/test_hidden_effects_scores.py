@@ -54,6 +54,19 @@ def test_right_name_at_right_joint(tmp_path: Path) -> None:
     assert not score.false()
 
 
+def test_the_gap_of_what_drifts_is_that_from_period_to_period(tmp_path: Path) -> None:
+    drift = Planted("friction_drift", "knee", "library", 0.1, {"kind": 0.0}, gap=0.02, torque_share=0.02)
+    gaps = {
+        "gap": {"shrink_holdout": 0.3},
+        "trend_gap": {"holdout": {"before": {"hip": 0.3, "knee": 0.4}, "after": {"hip": 0.0, "knee": 0.1}}},
+    }
+    scores = [
+        scored(tmp_path, planted, said(("friction_drift", "knee")) | gaps).shrink_holdout
+        for planted in ((drift,), (drift, RIPPLE))
+    ]
+    assert scores == pytest.approx([0.8, 0.3])
+
+
 @pytest.mark.parametrize("name", [("torque_ripple", "hip"), ("torque_offset", "knee")])
 def test_wrong_joint_and_wrong_effect_are_false(tmp_path: Path, name: tuple[str, str]) -> None:
     score = scored(tmp_path, (RIPPLE,), said(name))

@@ -9,6 +9,7 @@ from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.catalogue import ENTRIES
 from tests.benchmarks.hidden_effects.diagnose_case import RESULT
 from tests.benchmarks.hidden_effects.draw import truth_of
+from tests.benchmarks.hidden_effects.gap import TREND_EFFECTS
 from tests.benchmarks.hidden_effects.generate import case_folder
 from tests.benchmarks.hidden_effects.plants import nominal_robot
 from tests.benchmarks.hidden_effects.sizes import size_errors
@@ -52,7 +53,7 @@ class Score:
         found: entries of `missing`.
         lack_of_fit_p: p-value of the lack of fit.
         lack_of_fit_ratio: its statistic over its degrees of freedom.
-        shrink_holdout: share of the held-out gap that is gone.
+        shrink_holdout: share of the held-out gap that is gone; from period to period where all that is hidden drifts.
         shrink_simulation: the same of q in forward simulation; NaN where absent.
         seconds: of the diagnosis.
         record: the whole diagnosis.
@@ -141,7 +142,6 @@ def score_case(root: Path, truth: Path) -> Score | None:
         for m in record.get("missing", [])
     )
     lack = record.get("lack_of_fit") or {}
-    gap = record.get("gap") or {}
     simulated = (record.get("simulation_gap") or {}).get("q")
     return Score(
         case=case,
@@ -150,7 +150,7 @@ def score_case(root: Path, truth: Path) -> Score | None:
         found=found,
         lack_of_fit_p=_number(lack.get("p_value")),
         lack_of_fit_ratio=_number(lack.get("statistic")) / max(_number(lack.get("dof")), 1.0),
-        shrink_holdout=_number(gap.get("shrink_holdout")),
+        shrink_holdout=_shrink_holdout(case, record),
         shrink_simulation=_shrink(simulated),
         seconds=_number(record.get("seconds")),
         record=record,
@@ -161,6 +161,13 @@ def score_run(root: Path) -> list[Score]:
     """All diagnosed cases of a run."""
     scores = (score_case(root, truth) for truth in sorted((root / "truth").glob("*.json")))
     return [score for score in scores if score is not None]
+
+
+def _shrink_holdout(case: Case, record: dict[str, Any]) -> float:
+    """That of what was hidden: what drifts is none of the mean of a recording, but differs from period to period."""
+    if case.planted and all(p.effect in TREND_EFFECTS for p in case.planted):
+        return _shrink((record.get("trend_gap") or {}).get("holdout"))
+    return _number((record.get("gap") or {}).get("shrink_holdout"))
 
 
 def _shrink(gap: dict[str, Any] | None) -> float:
