@@ -20,6 +20,9 @@ NEWTON_STEPS = 4
 LEAST = 0.1
 """Smallest share of the compliance that lies before the encoder [-]."""
 
+FEWEST_SAMPLES = 16
+"""Samples from which on the rate of an acceleration is told."""
+
 
 @dataclass(frozen=True)
 class LinkFlexibility(SignalEffect):
@@ -136,10 +139,10 @@ class LinkFlexibility(SignalEffect):
         """(3, N) what the damping bends, with its rates, from the first two rates (2, N) of the deflection.
 
         Up to the frequency at which the damper becomes stiffer than the spring: beyond it, three derivatives of a
-        position are noise more than anything.
+        position are noise more than anything. Of a few samples the third is not told at all.
         """
-        if lag == 0.0:
-            return np.zeros((3, len(time)))
+        if lag == 0.0 or len(time) < FEWEST_SAMPLES:
+            return lag * np.stack([*rates, np.zeros(len(time))])
         corner = abs(self.compliance * stiffness / lag)
         slow = [below(time, each, corner) for each in rates]
         return lag * np.stack([*slow, rate_of(time, slow[1])])

@@ -121,3 +121,14 @@ def test_a_description_gives_the_spring_of_the_whole():
         bent = [lag, rate_of(motion.time, lag), rate_of(motion.time, rate_of(motion.time, lag))][order]
         wrong = getattr(found, name)[:, 0] - getattr(motion, name)[:, 0]
         assert np.std(wrong) < 0.1 * np.std(bent)
+
+
+@pytest.mark.parametrize("samples", [1, 7, 15, 16])
+def test_a_few_states_of_a_motion_are_enough_for_positions_and_velocities(samples):
+    leg, motion, _, _ = bending()
+    effect = make_effect("link_flexibility", "hip", compliance=COMPLIANCE, **LAW)
+    few, whole = effect.corrected(leg, motion[:samples]), effect.corrected(leg, motion)
+    assert np.all(np.isfinite(few.ddq))
+    if samples < 16:
+        np.testing.assert_allclose(few.q, whole.q[:samples], atol=1e-9)
+        np.testing.assert_allclose(few.dq, whole.dq[:samples], atol=1e-9)
