@@ -114,6 +114,7 @@ def test_what_stays_without_friction_of_links_begins_with_nothing(laboratory):
     assert search(bench, bench.effects, start=start).added == 1
 
 
+@pytest.mark.scenario
 def test_the_friction_that_is_described_takes_no_place_from_others(described, monkeypatch):
     monkeypatch.setattr(searching, "MOST_EFFECTS", 1)
     bench = described.bench(described.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})]))

@@ -52,6 +52,7 @@ def test_nothing_is_missing_where_the_last_joint_is_held(holding_laboratory):
     assert not [text for text in found.warnings if "wrong sign" in text or "is that the period" in text]
 
 
+@pytest.mark.scenario
 def test_what_is_missing_beside_a_joint_that_is_held_is_told_by_the_others_alone(holding_laboratory):
     """On another motion that joint moves: what was not told of it there is no test of what was."""
     planted = [("torque_offset", "knee", [1.0], {})]
@@ -117,6 +118,7 @@ def test_of_a_motor_that_is_held_no_friction_is_identified_and_the_others_are_as
             assert abs(value - getattr(actuator, f"{kind}_friction")) < 4.0 * std < 0.2
 
 
+@pytest.mark.scenario
 def test_motors_that_are_slow_are_not_held(holding_laboratory):
     """A hundredth of the usual speed is slower than friction turns over, and yet far beyond the noise of an encoder."""
     laboratory = holding_laboratory

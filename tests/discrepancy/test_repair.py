@@ -139,6 +139,7 @@ def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, drifted):
             assert abs(mean.value + change * term.values[1] - true - 3.0 * warming(time, 60.0)) < 3.0 * std
 
 
+@pytest.mark.scenario
 def test_a_small_drift_is_named_and_is_no_part_of_the_mean(leg, series):
     drift = planted("friction_drift", "knee", [0.3, 0.5], time_constant=60.0)
     recording = simulate(leg, series[0], periods=12, seed=70, effects=[drift]).recording

@@ -129,6 +129,7 @@ def test_along_a_shape_that_is_hardly_known_values_are_as_unsure_as_they_go(labo
     assert now.fit.statistic < 1.2 * now.fit.dof
 
 
+@pytest.mark.scenario
 def test_friction_that_turns_in_another_form_is_told_as_unsure_as_it_is_off(laboratory):
     """Half of a friction of the link turns at a quarter of the speed of the other half: no single turn is right."""
     speeds, values = (0.015, 0.06), np.array([0.4, 1.0])
