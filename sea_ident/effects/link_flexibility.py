@@ -107,7 +107,7 @@ class LinkFlexibility(SignalEffect):
             # of the part before the encoder
             stiffer = 1.0 / max(1.0 - c * linear, LEAST)
             linear, damping = stiffer * linear, stiffer**2 * damping
-        lag = self._lag(motion.time, np.stack([rate, bend]), c * damping, linear)
+        lag = self._lag(motion.time, np.stack([rate, bend]), damping, linear)
         return with_joint(
             robot,
             motion,
@@ -135,16 +135,16 @@ class LinkFlexibility(SignalEffect):
         out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]
         return out
 
-    def _lag(self, time: FloatArray, rates: FloatArray, lag: float, stiffness: float) -> FloatArray:
+    def _lag(self, time: FloatArray, rates: FloatArray, damping: float, stiffness: float) -> FloatArray:
         """(3, N) what the damping bends, with its rates, from the first two rates (2, N) of the deflection.
 
         Up to the frequency at which the damper becomes stiffer than the spring: beyond it, three derivatives of a
         position are noise more than anything. Of a few samples the third is not told at all.
         """
+        lag = self.compliance * damping
         if lag == 0.0 or len(time) < FEWEST_SAMPLES:
             return lag * np.stack([*rates, np.zeros(len(time))])
-        corner = abs(self.compliance * stiffness / lag)
-        slow = [below(time, each, corner) for each in rates]
+        slow = [below(time, each, abs(stiffness / damping)) for each in rates]
         return lag * np.stack([*slow, rate_of(time, slow[1])])
 
     def _whole_spring(self, robot: Robot) -> tuple[float, float, float]:
