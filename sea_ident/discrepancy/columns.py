@@ -164,7 +164,9 @@ class Columns:
         """The same, of shapes that nobody will ask for again."""
         signals = seen_by(variants[0], signal_effects(effects))
         state = self.state(signals)
-        return self._touched([variant.evaluate(state) for variant in variants], signals)
+        pieces, amounts = type(variants[0]).in_pieces(variants)
+        touched, spectra = self._touched([piece.evaluate(state) for piece in pieces], signals)
+        return touched, spectra if amounts is None else np.einsum("vp,hepk->hevk", amounts, spectra, optimize=True)
 
     def _touched(self, parts: Sequence[Contribution], signals: tuple[Effect, ...]) -> tuple[IntArray, ComplexArray]:
         """Equations with anything in them, and the spectra (H + 1, e, v, ...) of all parts there."""

@@ -289,12 +289,16 @@ def _windows(
             [s]; the begin and the end of the period are added.
         kept: whether these instants will be asked for again.
     """
-    period = bench.data.period
-    begin = -0.5 * period / bench.data.samples
+    period, samples = bench.data.period, bench.data.samples
+    begin = -0.5 * period / samples
     instants = instants[(instants > begin + NEARLY * period) & (instants < begin + (1.0 - NEARLY) * period)]
     instants = np.concatenate([[begin], instants, [begin + period]])
+    # within a sample the share of it that is pushed in, and so all that a push does, grows in a straight line
+    place = np.round((instants - begin) * (samples / period), 9)
+    below, above = np.floor(place), np.ceil(place)
+    knots = np.unique(np.concatenate([below, above]))
     # a push of a whole period would be none
-    stops = [float(instant) - NEARLY * period for instant in instants[1:]]
+    stops = [begin + float(knot) * (period / samples) - NEARLY * period for knot in knots[1:]]
     begun = [replace(rest.push, start=begin, stop=stop, period=period) for stop in stops]  # type: ignore[call-arg]
     touched, spectra = (bench.variant_spectra if kept else bench.spectra_of_variants)(begun, rest.effects)
     harmonics, equations, count, width = spectra.shape
@@ -302,8 +306,10 @@ def _windows(
     whole[:, touched] = spectra.reshape(harmonics, equations, count * width)
     scaled = np.asarray(whole * rest.scale[:, None], dtype=np.complex128)
     columns = rest.across(whiten(bench.whitener(noise), scaled)).reshape(-1, count, width)
-    # nothing pushes before the first instant
-    return instants, np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
+    # nothing pushes before the begin
+    columns = np.concatenate([np.zeros((len(columns), 1, width)), columns], axis=1)
+    one, other = (columns[:, np.searchsorted(knots, each - 0.5)] for each in (below, above))
+    return instants, one + (place - below)[:, None] * (other - one)
 
 
 def _window_gains(columns: FloatArray, left: FloatArray, begins: IntArray, ends: IntArray) -> FloatArray:

@@ -5,7 +5,7 @@ of the robot, and can act in a simulation. Rigid bodies, rotors and friction are
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any, ClassVar, Self
@@ -195,6 +195,15 @@ class Effect(ABC):
             replace(own, **dict(zip(names, map(float, values), strict=True)))  # type: ignore[arg-type]
             for values in product(*grids)
         )
+
+    @classmethod
+    def in_pieces(cls, variants: Sequence[Self]) -> tuple[Sequence[Self], FloatArray | None]:
+        """Shapes (p) of which the columns of others (v) are sums, and how often each is in each (v, p).
+
+        For effects of which many shapes share most of what they do. By default every shape stands for itself, and the
+        second one is None.
+        """
+        return variants, None
 
     def on(self, state: State) -> Self:
         """The same effect with the ranges that its shapes have on this motion; by default those of its kind."""

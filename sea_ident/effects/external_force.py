@@ -1,7 +1,9 @@
 """A push from outside during part of the time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from itertools import pairwise
+from typing import ClassVar, Self
 
 import numpy as np
 import pinocchio as pin
@@ -132,6 +134,19 @@ class ExternalForce(Effect):
                 stop = float(np.mod(start + length * period / _BEGINS, period))
                 found.append(replace(self, start=start, stop=stop, period=period))
         return tuple(found)
+
+    @classmethod
+    def in_pieces(cls, variants: Sequence[Self]) -> tuple[Sequence[Self], FloatArray | None]:
+        """Pushes that come again and differ by their edges alone: those from every edge to the next one."""
+        one = variants[0]
+        if not one.period > 0.0 or any(replace(v, start=one.start, stop=one.stop) != one for v in variants):
+            return variants, None
+        starts, stops = (np.mod([getattr(v, name) for v in variants], one.period) for name in WHEN)
+        edges = np.unique(np.concatenate([starts, stops]))
+        pieces = [replace(one, start=float(a), stop=float(b)) for a, b in pairwise([*edges, edges[0]])]
+        begins, inside = starts[:, None] <= edges, edges < stops[:, None]
+        goes_round = (stops < starts)[:, None]
+        return pieces, np.where(goes_round, begins | inside, begins & inside).astype(np.float64)
 
     @property
     def _point(self) -> FloatArray:

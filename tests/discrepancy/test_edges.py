@@ -11,8 +11,17 @@ import sea_ident
 from sea_ident.discrepancy import edges, words
 from sea_ident.discrepancy.assess import rivals
 from sea_ident.discrepancy.decide import simplest_first
-from sea_ident.discrepancy.edges import _best_window, at_centre, stays_on_the_centre, with_sharp_edges, without_another
+from sea_ident.discrepancy.edges import (
+    _best_window,
+    _Rest,
+    _windows,
+    at_centre,
+    stays_on_the_centre,
+    with_sharp_edges,
+    without_another,
+)
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, _eliminate, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -162,6 +171,24 @@ def test_the_best_window_is_the_one_that_fits_best(pushed):
     (start, stop), least = min(every.items(), key=lambda item: item[1])
     assert best == pytest.approx(((start - 0.5) * interval, (stop - 0.5) * interval))
     assert least < 0.5 * now.fit.statistic
+
+
+@pytest.mark.scenario
+def test_edges_between_samples_are_compared_as_pushes_are(pushed):
+    bench, now = pushed
+    effect = make_effect("external_force", "knee", start=1.0, stop=2.0, period=PERIOD, point_z=0.1)
+    rest = _Rest(effect, list(now.fit.effects), now.fit.scale, now.fit.whitened, lambda columns: columns)
+    interval = PERIOD / bench.data.samples
+    wanted = interval * np.array([0.3, 7.5, 7.75, 8.125, bench.data.samples - 1.4])
+    instants, columns = _windows(bench, rest, now.noise, wanted)
+    np.testing.assert_allclose(instants[1:-1], wanted, rtol=1e-12)
+    assert not np.any(columns[:, 0])
+    begin = float(instants[0])
+    for k, instant in enumerate([*wanted, begin + PERIOD - 1e-11], start=1):
+        push = replace(effect, start=begin, stop=float(instant))
+        own = bench.column_spectra(push, now.fit.effects) * now.fit.scale[:, None]
+        expected = whiten(bench.whitener(now.noise), own)
+        np.testing.assert_allclose(columns[:, k], expected, atol=1e-9 * np.abs(expected).max())
 
 
 @pytest.fixture(scope="module")

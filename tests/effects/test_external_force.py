@@ -64,3 +64,24 @@ def test_periods_one_after_the_other_have_the_shares_of_each(count):
     time = np.arange(400) * period / 400
     effect = make_effect("external_force", "knee", start=1.2345, stop=1.5678, period=period)
     np.testing.assert_allclose(effect.share_of(np.tile(time, count)), np.tile(effect.share_of(time), count))
+
+
+def test_pushes_are_sums_of_those_from_every_edge_to_the_next():
+    period = 4.0
+    robot = sea_ident.load_robot("exo_leg")
+    rng = np.random.default_rng(2)
+    state = State(robot, Motion(np.arange(80) * period / 80, *rng.standard_normal((6, 80, robot.n))))
+    windows = [(0.0, 1.0), (0.513, 3.207), (3.2, 0.35), (3.975, 3.975 - 1e-11), (1.0, 1.0), (3.207, 0.513)]
+    pushes = [make_effect("external_force", "knee", start=a, stop=b, period=period, point_x=0.1) for a, b in windows]
+    pieces, amounts = type(pushes[0]).in_pieces(pushes)
+    assert len(pieces) == len({time for window in windows for time in window})
+    each = np.stack([piece.evaluate(state).link for piece in pieces])
+    whole = np.stack([push.evaluate(state).link for push in pushes])
+    np.testing.assert_allclose(np.tensordot(amounts, each, axes=1), whole, atol=1e-12 * np.abs(whole).max())
+
+
+@pytest.mark.parametrize("other", [{"period": 0.0}, {"point_x": 0.1}])
+def test_pushes_that_differ_by_more_than_their_edges_stand_for_themselves(other):
+    push = make_effect("external_force", "knee", start=1.0, stop=2.0, period=4.0 * ("point_x" in other))
+    pushes = [push, make_effect("external_force", "knee", **(push.shape_values | {"period": push.period} | other))]
+    assert type(push).in_pieces(pushes) == (pushes, None)
