@@ -1,7 +1,7 @@
 """The generators of the hidden-effect benchmark: an independent engine obeys the equations of the library."""
 
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -364,6 +364,22 @@ def test_coarse_encoders_have_steps_far_above_their_noise_and_half_the_cases_hid
     # what is drawn in the other rows does not depend on it
     fine = draw_case(11, "one", 1).noise
     assert fine.link_step < 2.0 * fine.link_encoder
+
+
+@pytest.mark.scenario
+def test_rows_that_go_beyond_the_usual_do_so_and_leave_the_others_as_they_are() -> None:
+    large = draw_case(11, "large", 0).planted[0]
+    assert large.gap * 1.01 >= 0.05
+    assert large.gap <= 0.2 * 1.01
+    quiet = [draw_case(11, "quiet", 2 * k).noise for k in range(3)]
+    assert not any(getattr(quiet[0], f.name) for f in fields(quiet[0]) if f.name != "jitter_speed")
+    assert quiet[1].torque < 2e-4 < quiet[2].torque < 2e-3
+    assert all(noise.jitter_speed >= 0.03 for noise in quiet)
+    assert [draw_case(11, row, 0).periods for row in ("few", "none", "large")] == [5, 20, 20]
+    slippery, usual = (truth_of(replace(draw_case(11, "frictionless", 0), row=row)) for row in ("frictionless", "few"))
+    assert np.all(slippery.coulomb < 0.01 * usual.coulomb)
+    assert np.all(slippery.viscous < 0.01 * usual.viscous)
+    assert np.all(usual.stiffness > 0.0)
 
 
 @pytest.mark.scenario

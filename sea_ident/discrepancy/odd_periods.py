@@ -10,6 +10,10 @@ from sea_ident.discrepancy.data import PeriodData, around_reversals
 SPIKE = 8.0
 """How many times farther than the farthest sample of a usual period a sample must lie to count as a spike."""
 
+UNSEEN = 1e-4
+"""Share of the rms of a torque or an acceleration up to which a usual period may be taken to be away: a simulation
+without noise still settles in its last digits [-]."""
+
 MOST_SENSORS = 3
 """Sensors with spikes that are named, at most."""
 
@@ -105,7 +109,9 @@ def _spikes(data: PeriodData, other: set[int]) -> dict[int, set[str]]:
         if p not in other:
             beside |= around_reversals(motion, data.equations)
     sensors = ("torque", "link encoder", "motor encoder")
-    for sensor, stack, least in zip(sensors, (torque, *accelerations), (none, *steps), strict=True):
+    sizes = [np.sqrt(np.mean(stack**2, axis=(0, 1))) for stack in (data.period_tau_motor, *accelerations)]
+    for sensor, stack, size, step in zip(sensors, (torque, *accelerations), sizes, (none, *steps), strict=True):
+        least = np.maximum(step, UNSEEN * size)
         for i in range(data.robot.n):
             away = np.ones(data.samples, dtype=np.bool_)
             for e, equation in enumerate(data.equations):

@@ -26,6 +26,10 @@ FEWEST_PASSES = 3
 REVERSAL = 0.05
 """Time around a reversal in which no push is looked for where nothing repeats [s]."""
 
+AT_AN_END = 0.05
+"""Time at the beginning and at the end of a recording in which no push is looked for: what is filtered and
+differentiated has data on one side only not far from there [s]."""
+
 SHORTEST = 0.01
 """What departs for less than this is a spike of a sensor or the instant of a jump of friction, no push [s]."""
 
@@ -72,7 +76,13 @@ class Push:
     z: float
 
 
-def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_samples: int = 0) -> tuple[Push, ...]:
+def find_pushes(
+    time: FloatArray,
+    residual: FloatArray,
+    speed: FloatArray,
+    pass_samples: int = 0,
+    least: FloatArray | float = 0.0,
+) -> tuple[Push, ...]:
     """Find where a residual departs for a short time from what it is otherwise.
 
     Where the motion repeats itself, the median over the passes is taken off first: friction at reversals and whatever
@@ -85,10 +95,12 @@ def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_
         residual: (N, n) measured less modelled torque.
         speed: (N, n) of the joints.
         pass_samples: samples of one pass of a motion that repeats itself, 0 where it does not.
+        least: (n,) force that matters; what is smaller is none, however quiet the residual is else [N m] or [N].
 
     Returns:
         Pushes in the order of time.
     """
+    least = np.broadcast_to(least, residual.shape[1:])
     interval = float(time[1] - time[0])
     window = max(1, round(WINDOW / interval))
     repeats = pass_samples > 0 and len(time) >= FEWEST_PASSES * pass_samples
@@ -96,14 +108,14 @@ def find_pushes(time: FloatArray, residual: FloatArray, speed: FloatArray, pass_
     found: list[Push] = []
     for i in range(residual.shape[1]):
         smooth = uniform_filter1d(own[:, i], window)
-        usable = np.ones(len(time), dtype=np.bool_)
+        usable = (time - time[0] >= AT_AN_END) & (time[-1] - time >= AT_AN_END)
         slow = np.abs(speed[:, i]) < SLOW * float(np.sqrt(np.mean(speed[:, i] ** 2)))
         reversing = _near_reversal(speed[:, i], slow, round(REVERSAL / interval))
         if not repeats:
-            usable = ~reversing
+            usable &= ~reversing
             # slow misfit is not a push
             smooth = smooth - _slow(smooth, usable, max(window, round(0.5 / interval)))
-        found.extend(_runs(i, time, own[:, i], smooth, usable, slow, reversing))
+        found.extend(_runs(i, time, own[:, i], smooth, usable, slow, reversing, float(least[i])))
     return tuple(sorted(found, key=lambda p: p.start))
 
 
@@ -156,11 +168,12 @@ def _runs(
     usable: NDArray[np.bool_],
     slow: NDArray[np.bool_],
     reversing: NDArray[np.bool_],
+    least: float,
 ) -> list[Push]:
     interval = float(time[1] - time[0])
     if np.count_nonzero(usable) < 16:
         return []
-    spread = float(np.median(np.abs(smooth[usable])) / 0.6745)
+    spread = max(float(np.median(np.abs(smooth[usable])) / 0.6745), least / SIGNIFICANT)
     if spread <= 0.0:
         return []
     high = usable & (np.abs(smooth) > SIGNIFICANT * spread)

@@ -33,7 +33,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.judge import at_a_bound, own_torque, significance, torque_change
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.named import named_effect
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
@@ -101,7 +101,13 @@ def pushes_between_passes(model: Model, recording: Recording, processed: Process
     except SeaIdentError:
         return ()
     samples = round(processed.period / whole.interval)
-    return find_pushes(whole.motion.time, whole.tau_motor - predicted, whole.motion.dtheta, samples)
+    left = whole.tau_motor - predicted
+    return find_pushes(whole.motion.time, left, whole.motion.dtheta, samples, _least(whole.tau_motor))
+
+
+def _least(torque: FloatArray) -> FloatArray:
+    """(n,) smallest push that matters beside the torque of the motors (N, n) [N m]."""
+    return np.asarray(SMALLEST_SHARE * np.sqrt(np.mean(torque**2, axis=0)), dtype=np.float64)
 
 
 def diagnose_unrepeated(
@@ -131,7 +137,8 @@ def diagnose_unrepeated(
     for _ in range(2):
         basic = completed(bench)
         now = start if basic is None else basic.selection.final
-        found_now = find_pushes(motion.time, full_residual(bench, now.fit), motion.dtheta, pass_samples)
+        left = full_residual(bench, now.fit)
+        found_now = find_pushes(motion.time, left, motion.dtheta, pass_samples, _least(processed.tau_motor))
         if found_now == pushes:
             break
         pushes = found_now

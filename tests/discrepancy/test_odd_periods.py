@@ -109,3 +109,22 @@ def test_a_joint_that_stiction_lets_go_late_in_one_pass_is_no_spike(counted, leg
     motions[2] = replace(motions[2], **changed)
     kept, _ = cleaned(replace(data, period_motions=tuple(motions)), counted)
     assert kept.periods == (8 if held else 7)
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_simulation_without_noise_has_no_spikes_in_its_last_digits(leg):
+    """What settles shows in the first periods, a thousand times above what is left in the later ones."""
+    fine = record(leg, truth_of(leg, leg_series(), samples=1000), 8, torque_noise=1e-9, encoder_noise=1e-12)
+    fading = np.exp(-fine.time / 2.0)
+    columns = {
+        name: values + 1e-9 * fading * (np.arange(len(values)) % 97 == 0) if name.startswith("q_") else values
+        for name, values in fine.columns.items()
+    }
+    columns["tau_motor_hip"] = columns["tau_motor_hip"] + 1e-5 * fading * (np.arange(len(fine.time)) % 89 == 0)
+    recording = Recording(fine.time, columns, "fine")
+    assert said_of(recording, leg) == ([1, 2, 3, 4, 5, 6, 7, 8], [])
+    spiked = columns["tau_motor_knee"].copy()
+    spiked[2340] += 1.0
+    kept, said = said_of(recording, leg, tau_motor_knee=spiked)
+    assert kept == [1, 2, 4, 5, 6, 7, 8]
+    assert "(torque of knee)" in said[0]

@@ -52,6 +52,28 @@ def test_two_pushes_at_two_joints_in_the_order_of_time():
     assert [p.joint for p in found] == [1, 0]
 
 
+def test_what_matters_to_nobody_is_no_push_however_quiet_the_rest():
+    """As where a simulation without noise has settled but for the last digits."""
+    values = residual(noise=1e-9)
+    values[1234:1302] += [1.5e-5, -1.5]
+    assert len(find_pushes(TIME, values, SPEED, SAMPLES)) == 2
+    (push,) = find_pushes(TIME, values, SPEED, SAMPLES, least=np.array([1e-3, 1e-3]))
+    assert push.joint == 1
+    assert push.force == pytest.approx(-1.5, abs=1e-6)
+    assert abs(push.start - TIME[1234]) <= 1.01 * INTERVAL
+
+
+@pytest.mark.parametrize("samples", [SAMPLES, 0])
+def test_what_a_filter_makes_of_the_ends_of_a_recording_is_no_push(samples):
+    values = residual(noise=1e-6) if samples else 1e-6 * residual(noise=0.5)
+    values[:3] += 0.3
+    values[-4:] -= 0.2
+    assert find_pushes(TIME, values, SPEED, samples) == ()
+    values[2000:2030, 0] += 0.3
+    (push,) = find_pushes(TIME, values, SPEED, samples)
+    assert push.force == pytest.approx(0.3, rel=0.01)
+
+
 def test_what_comes_again_in_every_pass_is_no_push():
     for seed in range(5):
         assert find_pushes(TIME, residual(seed), SPEED, SAMPLES) == ()

@@ -1,7 +1,7 @@
 """Cases from a seed: rows of the table, effects, places, sizes, noise."""
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -39,6 +39,10 @@ class Row:
         half: whether half of the cases hide nothing.
         coarse: whether the steps of the encoders are far above their noise.
         robots: that take turns; the leg most of the time where there are none.
+        gap: of a single effect, from the smallest to the largest, as a share of torque [-].
+        periods: of the training recording.
+        noise: by which all noise, and the jitter of friction, is multiplied: any of these [-].
+        friction: by which that of all joints is multiplied [-].
     """
 
     name: str
@@ -49,6 +53,10 @@ class Row:
     half: bool = False
     coarse: bool = False
     robots: tuple[str, ...] = ()
+    gap: tuple[float, float] = (0.012, 0.05)
+    periods: int = 20
+    noise: tuple[float, ...] = (1.0,)
+    friction: float = 1.0
 
 
 ROWS = {
@@ -81,6 +89,17 @@ ROWS = {
             half=True,
             robots=("anymal", "icub", "centauro", "panda", "talos"),
         ),
+        Row("large", "one effect, gap 5 to 20 % of torque", 14, LIBRARY, gap=(0.05, 0.2)),
+        Row(
+            "quiet",
+            "no noise, or a hundredth or tenth of it, nothing or one effect",
+            15,
+            LIBRARY,
+            half=True,
+            noise=(0.0, 0.01, 0.1),
+        ),
+        Row("few", "five periods, nothing or one effect", 16, LIBRARY, half=True, periods=5),
+        Row("frictionless", "next to no friction, nothing or one effect", 17, LIBRARY, half=True, friction=1e-3),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }
@@ -93,7 +112,9 @@ def row_generator(seed: int, row: str, index: int, purpose: int = 0) -> np.rando
 
 def truth_of(case: Case) -> Truth:
     """The robot of a case."""
-    return drawn_truth(case.robot, row_generator(case.seed, case.row, case.index, 1))
+    truth = drawn_truth(case.robot, row_generator(case.seed, case.row, case.index, 1))
+    share = ROWS[case.row].friction
+    return replace(truth, viscous=share * truth.viscous, coulomb=share * truth.coulomb)
 
 
 def trajectories_of(case: Case) -> tuple[FourierSeries, FourierSeries]:
@@ -138,14 +159,14 @@ def draw_case(seed: int, row: str, index: int) -> Case:
         robot=robot,
         engine="mujoco",
         period=float(rng.choice([4.0, 5.0, 8.0] if robot == "exo_leg" else [5.0])),
-        periods=20 if row != "none" or index % 2 == 0 else 10,
+        periods=what.periods if row != "none" or index % 2 == 0 else 10,
         holdout_periods=8,
         weak=what.weak,
         channel="current" if rng.random() < 0.25 else "tau_motor",
         # a ramp, or friction that sticks, is no base model: where a motor stands still for some samples, that shows
         friction_form="tanh",
         friction_smoothing=_log(rng, 0.003, 0.02),
-        noise=_noise(rng, what.coarse),
+        noise=_quieter(_noise(rng, what.coarse), what.noise[index // 2 % len(what.noise)]),
         planted=(),
         reference=row == "reference",
     )
@@ -178,6 +199,12 @@ def _noise(rng: np.random.Generator, coarse: bool) -> Noise:
     return replace(noise, link_step=float(2.0 * np.pi / 2**link_bits), motor_step=float(2.0 * np.pi / 2**motor_bits))
 
 
+def _quieter(noise: Noise, share: float) -> Noise:
+    """A share of a noise, the range of speeds in which friction differs aside."""
+    quieter = {f.name: share * getattr(noise, f.name) for f in fields(noise) if f.name != "jitter_speed"}
+    return replace(noise, **quieter)
+
+
 def _encoder_step(noise: float) -> float:
     """Largest step of a binary encoder that its noise still spreads over neighbouring counts."""
     return float(2.0 * np.pi / 2.0 ** np.ceil(np.log2(2.0 * np.pi / (1.5 * noise))))
@@ -201,7 +228,7 @@ def _hide(case: Case, gauge: Gauge, rng: np.random.Generator) -> tuple[Planted, 
             small = _one(case, gauge, rng, entries, target, None, tuple(found))
             found.append(replace(small, small=True))
         return tuple(found)
-    planted = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), case.index)
+    planted = _one(case, gauge, rng, entries, _log(rng, *ROWS[row].gap), case.index)
     while row == "one_small":
         with suppress(FloatingPointError):
             return (gauge.measure(replace(planted, size=SMALL_SHARE * planted.size)),)
