@@ -17,6 +17,7 @@ from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.judge import (
     EQUALLY_GOOD,
     FEWEST_TO_SEARCH,
+    SMALLEST_SHARE,
     flat_steps,
     never_closed,
     penalty,
@@ -25,7 +26,7 @@ from sea_ident.discrepancy.judge import (
     too_short,
 )
 from sea_ident.discrepancy.linear import off, span, whiten
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, LITTLE_LEFT, NEARLY_RIGHT, SCATTER_LEVEL
 from sea_ident.discrepancy.noise import ComplexArray, NoiseFloor, closed_freedom, unstacked
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.powers import with_its_power

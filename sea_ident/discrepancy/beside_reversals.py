@@ -10,10 +10,10 @@ from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, too_short, torque_changes
+from sea_ident.discrepancy.judge import EQUALLY_GOOD, SMALLEST_SHARE, too_short, torque_changes
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.lacking import candidate_effects
-from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, SMALLEST_SHARE, next_effect
+from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, next_effect
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import MOST_EFFECTS

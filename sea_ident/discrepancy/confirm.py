@@ -9,9 +9,9 @@ from sea_ident.discrepancy.breakaway import lets_go_late
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.data import BARELY_SEEN, MOST_LEFT_OUT, away_from_reversals
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import flat_steps, scatter_p, significance, torque_change
+from sea_ident.discrepancy.judge import SMALLEST_SHARE, flat_steps, scatter_p, significance, torque_change
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.discrepancy.taken_up import taken_up

@@ -23,6 +23,7 @@ from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.drifting import drifting
 from sea_ident.discrepancy.edges import stays_on_the_centre
 from sea_ident.discrepancy.findings import Verdict
+from sea_ident.discrepancy.gap import torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
@@ -36,7 +37,7 @@ from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
-from sea_ident.discrepancy.unrepeated import diagnose_unrepeated, pushes_between_passes
+from sea_ident.discrepancy.unrepeated import diagnose_pushed, diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
@@ -114,7 +115,9 @@ def diagnose(
             with python_warnings.catch_warnings():
                 python_warnings.simplefilter("ignore", SeaIdentWarning)
                 stretch = filter_recording(recording, robot)
-            return diagnose_unrepeated(model, stretch, recording, round(processed.period / stretch.interval))
+            diagnosis = diagnose_pushed(model, stretch, recording, round(processed.period / stretch.interval))
+            if diagnosis is not None:
+                return diagnosis
     whole = period_data(processed, robot)
     data, notes = check.cleaned(whole, recording)
     as_identified = check.as_identified(recording, processed, robot)
@@ -163,7 +166,7 @@ def diagnose(
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
         repaired = repaired.changing(changing.terms(bench, selection.final.fit, trends))
-        diagnosis = with_repaired(diagnosis, repaired)
+        diagnosis = with_repaired(diagnosis, repaired, torque_by_joint(bench))
         diagnosis = replace(diagnosis, trend_gap=changing.gaps(bench, selection.final.fit, trends, held))
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)

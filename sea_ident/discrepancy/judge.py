@@ -27,6 +27,9 @@ from sea_ident.robot import Robot
 EQUALLY_GOOD = 13.8
 """Two effects between whose statistics there is less than this (odds of a thousand) are not told apart."""
 
+SMALLEST_SHARE = 1e-3
+"""An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
+
 COMPLETE = 0.9
 """Share of the excess from which on an effect explains nearly all of it."""
 

@@ -15,6 +15,7 @@ from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import (
     COMPLETE,
+    SMALLEST_SHARE,
     at_a_bound,
     comes_first,
     flat_steps,
@@ -52,9 +53,6 @@ USEFUL_BESIDE_MANY = 0.5
 USEFUL_AGAIN = 0.4
 """Another of a kind that was added at the same joint must explain this share: orders of a ripple that are really there
 explain the rest, a form that is not that of a ripple is a sum of many."""
-
-SMALLEST_SHARE = 1e-3
-"""An effect must change the torque of one of its equations by this share of the rms, or it does not matter."""
 
 BESIDE_ANOTHER = 0.12
 """And by this share of what another effect does to the same equation, for the form of that one is known no better,

@@ -1,5 +1,6 @@
 """The repaired model beside the model as it was, in forward simulation, and what to know before it is used."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut
+from sea_ident.discrepancy.judge import SMALLEST_SHARE
 from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
@@ -95,13 +97,19 @@ def _forward(
     return replace(found, notes=(*same, *found.notes))
 
 
-def with_repaired(diagnosis: Diagnosis, repaired: Repaired) -> Diagnosis:
-    """A diagnosis with the repaired model, and with what speaks against that one."""
+def with_repaired(diagnosis: Diagnosis, repaired: Repaired, torque: Mapping[str, float]) -> Diagnosis:
+    """A diagnosis with the repaired model, and with what speaks against that one.
+
+    Args:
+        diagnosis: the diagnosis.
+        repaired: the model.
+        torque: rms by joint [N m] or [N].
+    """
     found = replace(diagnosis, model=repaired.model, simulation_gap=repaired.gaps)
-    return replace(found, warnings=(*found.warnings, *_worse_than_the_fit(found), *_worse_than_before(found)))
+    return replace(found, warnings=(*found.warnings, *_worse_than_the_fit(found, torque), *_worse_than_before(found)))
 
 
-def _worse_than_the_fit(diagnosis: Diagnosis) -> tuple[str, ...]:
+def _worse_than_the_fit(diagnosis: Diagnosis, torque: Mapping[str, float]) -> tuple[str, ...]:
     """Where the repaired model leaves far more than the fit that it was made from."""
     model, gap = diagnosis.model, diagnosis.training
     if model is None or gap is None or model.fit.agreement is None:
@@ -111,7 +119,8 @@ def _worse_than_the_fit(diagnosis: Diagnosis) -> tuple[str, ...]:
     for joint, left, noise in zip(model.robot.joints, own.gap, own.noise, strict=True):
         fitted = gap.after[joint.name]
         # the noise of a fit knows what steps of encoders do in every period, that of the model what none compares
-        if left > FAR_ABOVE * np.linalg.norm([fitted, gap.noise[joint.name], noise]):
+        usual = np.linalg.norm([fitted, gap.noise[joint.name], noise])
+        if left > max(FAR_ABOVE * usual, SMALLEST_SHARE * torque[joint.name]):
             parts.append(f"{left:.3g} {joint.torque_unit} at {joint.name} (the fit {fitted:.2g}, noise {noise:.2g})")
     if not parts:
         return ()

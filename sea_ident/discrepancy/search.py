@@ -14,6 +14,7 @@ from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.judge import (
+    SMALLEST_SHARE,
     at_a_bound,
     is_given,
     is_push,
@@ -29,7 +30,6 @@ from sea_ident.discrepancy.next_effect import (
     BESIDE_ANOTHER,
     FAMILY_LEVEL,
     LARGE_TORQUE,
-    SMALLEST_SHARE,
     next_effect,
     visible_changes,
 )

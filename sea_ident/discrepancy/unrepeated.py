@@ -30,10 +30,10 @@ from sea_ident.discrepancy.findings import (
     Verdict,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import at_a_bound, own_torque, significance, torque_change
+from sea_ident.discrepancy.judge import SMALLEST_SHARE, at_a_bound, own_torque, significance, torque_change
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.named import named_effect
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
 from sea_ident.discrepancy.repair import repaired_model
@@ -111,10 +111,7 @@ def _least(torque: FloatArray) -> FloatArray:
 
 
 def diagnose_unrepeated(
-    model: Model,
-    processed: ProcessedRecording,
-    recording: Recording | ProcessedRecording,
-    pass_samples: int = 0,
+    model: Model, processed: ProcessedRecording, recording: Recording | ProcessedRecording
 ) -> Diagnosis:
     """Say what can still be said of one stretch.
 
@@ -122,11 +119,42 @@ def diagnose_unrepeated(
         model: the model; its parameters are refitted.
         processed: the stretch.
         recording: what it comes from.
-        pass_samples: samples of one pass of a motion that repeats itself, 0 where it does not.
 
     Returns:
         The diagnosis, in weaker words.
     """
+    return _diagnosed(model, processed, recording, _settled_beside_pushes(model, processed, 0))
+
+
+def diagnose_pushed(
+    model: Model, processed: ProcessedRecording, recording: Recording, pass_samples: int
+) -> Diagnosis | None:
+    """Say what can be said where pushes spoil the mean of a motion that repeats itself.
+
+    Args:
+        model: the model; its parameters are refitted.
+        processed: the recording as one stretch.
+        recording: what it comes from.
+        pass_samples: samples of one pass.
+
+    Returns:
+        The diagnosis, in weaker words; None where nothing pushes beside the model refitted, for then the mean tells
+        more.
+    """
+    settled = _settled_beside_pushes(model, processed, pass_samples)
+    return _diagnosed(model, processed, recording, settled) if settled.pushes else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """One stretch and the model refitted to it, where nothing pushes."""
+
+    bench: StretchBench
+    start: Settled
+    pushes: tuple[Push, ...]
+
+
+def _settled_beside_pushes(model: Model, processed: ProcessedRecording, pass_samples: int) -> _Stretch:
     robot = model.robot
     springs = spring_effects(robot) if robot.elastic_indices.size else ()
     effects = (*model.effects, *springs)
@@ -145,6 +173,13 @@ def diagnose_unrepeated(
         left_out = np.stack([pushed(pushes, motion.time, i, AFTER_PUSH) for i in range(robot.n)], axis=1)
         bench = StretchBench(stretch_data(processed, robot, left_out), effects)
         start = settle(bench, effects)
+    return _Stretch(bench, start, pushes)
+
+
+def _diagnosed(
+    model: Model, processed: ProcessedRecording, recording: Recording | ProcessedRecording, settled: _Stretch
+) -> Diagnosis:
+    robot, bench, start, pushes = model.robot, settled.bench, settled.start, settled.pushes
     basic = completed(bench)
     if basic is None:
         now, found = _search(bench, start)
@@ -191,7 +226,7 @@ def diagnose_unrepeated(
         unsound = replace(diagnosis, verdict=Verdict.CANNOT_TELL, text=words.UNSOUND, warnings=processed.warnings)
         diagnosis = without_sizes(unsound)
     for text in diagnosis.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=5)
     return diagnosis
 
 

@@ -289,8 +289,8 @@ def _kept_periods(
         found.append(
             f"{source}: periods {', '.join(f'{a + 1} and {b + 1}' for a, b in copies[:3])} "
             f"{'and others ' if len(copies) > 3 else ''}are the same numbers: measurements never are. "
-            f"{len(copies)} of {count} periods are copies and were left out; look for where the file was put together, or give a "
-            "simulation the noise of sensors"
+            f"{len(copies)} of {count} periods are copies and were left out; look for where the file was put together, "
+            "or give a simulation the noise of sensors"
         )
         dropped = {a for a, _ in copies}
         keep = [p for p in keep if p not in dropped]

@@ -16,8 +16,8 @@ from sea_ident.discrepancy.data import (
     away_from_reversals,
 )
 from sea_ident.discrepancy.exchange import Outdone
-from sea_ident.discrepancy.judge import significance, torque_change
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL, SMALLEST_SHARE
+from sea_ident.discrepancy.judge import SMALLEST_SHARE, significance, torque_change
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.search import MOST_EFFECTS, Selection, search, without
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect

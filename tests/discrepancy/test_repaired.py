@@ -22,13 +22,13 @@ def sizes(*values):
     return dict(zip(JOINTS, values, strict=True))
 
 
-def judged(leg, rms, gaps=None):
+def judged(leg, rms, gaps=None, torque=10.0):
     """Warnings of a diagnosis whose fit leaves 0.2 N m in the knee, with a model that leaves this much."""
     training = Gap(sizes(0.0, 3.0, 0.0), sizes(0.0, 0.2, 0.0), NOISE)
     found = Diagnosis(Verdict.NAMED, "A.", LackOfFit(0.0, 1, 1.0, 1.0, {}), training=training, warnings=("before",))
     agreement = Agreement(np.array(rms), np.full(3, 0.1), np.ones(3))
     model = SimpleNamespace(robot=leg, fit=SimpleNamespace(agreement=agreement))
-    first, *more = with_repaired(found, Repaired(model, gaps or {}, ())).warnings
+    first, *more = with_repaired(found, Repaired(model, gaps or {}, ()), dict.fromkeys(JOINTS, torque)).warnings
     assert first == "before"
     return more
 
@@ -65,6 +65,8 @@ def test_a_model_far_from_the_fit_is_not_to_be_relied_on(leg):
         "the repaired model is far from what this diagnosis fitted: of the motor torque it leaves 2 N m at knee (the "
         "fit 0.2, noise 0.1) beyond the noise"
     )
+    # a thousandth of the torque, however quiet the recording
+    assert judged(leg, [0.12, 2.0, 0.15], torque=2001.0) == []
 
 
 def test_a_gap_that_grows_in_forward_simulation_is_said_with_its_numbers(leg):
