@@ -212,8 +212,11 @@ def compare_periods(
         unexplained = trend_excess(left, middle)
         while len(chosen) > 1 and chosen[-1].gain < SHADOW * unexplained:
             chosen = find_trends(numbers, directions, middle, noise, len(chosen) - 1, LEVEL, matters, known)
-        if unexplained > UNEXPLAINED * trend_excess(flat, middle):
+        whole_excess = trend_excess(flat, middle)
+        if unexplained > UNEXPLAINED * whole_excess:
             chosen = []
+        # nor is the form of a large drift known any better than to that share of it
+        unnamed = not chosen or unexplained > BESIDE_ANOTHER**2 * whole_excess
     column_p = min((c.p_value for c in chosen), default=1.0)
     if not chosen:
         column_p = best_trend(numbers, directions, middle, noise).p_value

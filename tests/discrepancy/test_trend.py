@@ -173,6 +173,21 @@ def test_what_the_library_lacks_is_not_named_by_a_part_of_it(softening, monkeypa
     assert found.unnamed
 
 
+@pytest.mark.scenario
+@pytest.mark.parametrize(("share", "unnamed"), [(0.1, False), (0.4, True)])
+def test_what_a_large_drift_leaves_by_its_form_is_no_other_trend(laboratory, leg, share, unnamed):
+    """Beside friction that doubles, a torque that swings and grows with time, as no effect does."""
+    recording = laboratory.record([("friction_drift", "knee", [0.0, 10.0], {})], periods=16)
+    since = recording.time - recording.time[0]
+    drive = leg.joints[1].actuator
+    swinging = share * 10.0 * since / 60.0 * np.sin(2.0 * np.pi * 6.0 * since / 5.0)
+    current = recording.columns["current_knee"] + swinging / (drive.gear_ratio * drive.torque_constant)
+    columns = {**recording.columns, "current_knee": current}
+    found = compared(laboratory.bench(Recording(recording.time, columns, "swinging")))
+    assert [(t.effect.name, t.effect.joint) for t in found.trends] == [("friction_drift", "knee")]
+    assert found.unnamed is unnamed
+
+
 def test_a_leg_that_stays_as_it_is_has_no_trend(nothing_missing):
     bench, now = nothing_missing
     found = compare_periods(bench, now.fit)
