@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.command import command_of
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.forward import SameDrive, simulation_gap
+from sea_ident.discrepancy.forward import SameDrive, every_which, simulated, simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify
 from sea_ident.simulation import Controller, FrictionJitter, PlantedEffect, SensorNoise, VelocityController, simulate
@@ -17,9 +18,15 @@ PERIOD = 5.0
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 
 
-def exact(leg, series, planted, periods=2):
+def exact(leg, series, planted, periods=2, rate=200.0):
     return simulate(
-        leg, series, periods=periods, effects=planted, sensors=SensorNoise.none(), jitter=FrictionJitter.none()
+        leg,
+        series,
+        periods=periods,
+        effects=planted,
+        sensors=SensorNoise.none(),
+        jitter=FrictionJitter.none(),
+        rate=rate,
     ).recording
 
 
@@ -48,6 +55,29 @@ def test_a_model_with_the_true_error_of_a_sensor_simulates_what_was_recorded(leg
     if name == "torque_delay":
         assert found.gaps["tau"].before["knee"] > 0.02
         assert found.gaps["tau"].after["knee"] < 0.3 * found.gaps["tau"].before["knee"]
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("reference", [True, False])
+def test_of_many_samples_a_second_as_many_are_simulated_as_are_usual(leg, series, reference):
+    """To the same gap as one of the recording taken at that rate."""
+    effect = make_effect("stribeck_friction", "knee", speed=0.1)
+    gaps = []
+    for rate in (200.0, 1000.0):
+        training, other = (exact(leg, each, [PlantedEffect(effect, np.array([0.8]))], rate=rate) for each in series)
+        models = [
+            identify(leg, training, effects=effects, period=PERIOD)
+            for effects in (base_effects(leg), (*base_effects(leg), effect))
+        ]
+        recording = other if reference else without_reference(other)
+        processed = wide_processing(recording, leg, PERIOD)
+        gaps.append(simulation_gap(*models, recording, processed).gaps["q"])
+    assert every_which(processed) == 5
+    run = simulated(models[1], command_of(models[1], recording, processed, None), processed)
+    assert {len(values) for values in run.values()} == {processed.samples // 5}
+    there, late = (np.linalg.norm(run["q"] - np.roll(processed.motion.q, k, axis=0)[::5]) for k in (0, 5))
+    assert there < 0.1 * late
+    assert gaps[1].before["knee"] == pytest.approx(gaps[0].before["knee"], rel=0.1)
 
 
 @pytest.mark.scenario
