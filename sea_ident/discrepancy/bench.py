@@ -115,6 +115,10 @@ class Bench(ParameterFits):
             raise ValueError(f"{data.source} is another recording, or other periods of it")
         return Bench(data, self.effects, self._evaluated)
 
+    def modelling(self, effects: Sequence[Effect]) -> "Bench":
+        """The same recording with another model."""
+        return Bench(self.data, effects, self._evaluated)
+
     def apart(self) -> "Bench":
         """The same bench, on which samples may be released that are compared on this one."""
         return copy(self)

@@ -128,10 +128,13 @@ def decide(
                     left.append(other)
                 if fit is None or rival is None:
                     continue
+                replaced = replace(selection, final=Settled(fit, selection.final.noise))
+                if rival.remembers == own.remembers and held.foretell_the_same(selection, replaced):
+                    left.extend(() if other.behind or other.dearer else (replace(other, fit=fit),))
+                    continue
                 swapped = _better(rival, own, other.behind)
                 if swapped:
                     before = selection.final.fit
-                    replaced = replace(selection, final=Settled(fit, selection.final.noise))
                     selection, changed = replace(replaced, final=Settled(fit, bench.noise(fit))), True
                     held = held.again(replaced)
                     # what was no better than the one that is now out was no better than this one

@@ -28,6 +28,7 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_experiment import with_next_experiment
+from sea_ident.discrepancy.possible_springs import impossible_springs, left_without_cubic, without_cubic
 from sea_ident.discrepancy.repaired import repair, with_repaired
 from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
@@ -130,10 +131,10 @@ def diagnose(
     basic = completed(bench)
     if basic is not None:
         found = _compared(bench, confirm(bench, basic.selection), changing)
-    elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful or _in_steps(bench):
-        found = _compared(bench, confirm(bench, _unsearched(bench)), changing)
+    elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful:
+        found = _unsearched(bench, changing)
     else:
-        found = _searched(bench, changing, tell)
+        found = _searched_with_possible_springs(bench, changing, tell)
     bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
     alternatives: Alternatives = {}
@@ -190,6 +191,25 @@ class _Found:
 
 def _compared(bench: Bench, confirmed: Confirmed, changing: Changing, notes: tuple[str, ...] = ()) -> _Found:
     return _Found(bench, confirmed, changing.compared(confirmed.bench, confirmed.final.fit), notes)
+
+
+def _searched_with_possible_springs(bench: Bench, changing: Changing, tell: Progress) -> _Found:
+    """Search, and once more without the cubic terms of springs that are impossible with what was found."""
+    found = _searched_beyond_steps(bench, changing, tell)
+    impossible = impossible_springs(bench, found.confirmed.final.fit)
+    if not impossible:
+        return found
+    other = _searched_beyond_steps(without_cubic(bench, impossible), changing, tell)
+    if any(other.confirmed.final.fit.parameters[f"{joint}.spring_stiffness"] < 0.0 for joint in impossible):
+        return found
+    return replace(other, notes=(*other.notes, *left_without_cubic(bench.robot, impossible)))
+
+
+def _searched_beyond_steps(bench: Bench, changing: Changing, tell: Progress) -> _Found:
+    """Search, unless the steps of the encoders may be all that is left."""
+    if bench.data.step_errors is not None and steps_cover(bench, settle(bench, bench.effects)):
+        return _unsearched(bench, changing)
+    return _searched(bench, changing, tell)
 
 
 def _searched(bench: Bench, changing: Changing, tell: Progress) -> _Found:
@@ -335,16 +355,12 @@ def _on_centres(bench: Bench, selection: Selection) -> tuple[str, ...]:
     return tuple(words.on_the_centre(fit.effects[k].joint or "") for k in told)
 
 
-def _in_steps(bench: Bench) -> bool:
-    """Whether nothing is to be searched for: the steps of the encoders may be all that is left."""
-    return bench.data.step_errors is not None and steps_cover(bench, settle(bench, bench.effects))
-
-
-def _unsearched(bench: Bench) -> Selection:
+def _unsearched(bench: Bench, changing: Changing) -> _Found:
     """The model as it is, and what could have been seen beside it."""
     start = settle(bench, bench.effects)
     candidates = tuple(scan(bench, start.fit, start.noise))
-    return Selection(start, start, 0, (), candidates, max(sum(c.tests for c in candidates), 1))
+    selection = Selection(start, start, 0, (), candidates, max(sum(c.tests for c in candidates), 1))
+    return _compared(bench, confirm(bench, selection), changing)
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:

@@ -12,6 +12,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of, torque_by_joint
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
@@ -80,6 +81,16 @@ class HeldOut:
         """The same data with another selection."""
         found = tried(self.bench, selection, self.source)
         return replace(found, processed=self.processed, recording=self.recording, kind=self.kind)
+
+    def foretell_the_same(self, one: Selection, other: Selection) -> bool:
+        """Whether two selections say the same of these data, all parameters as they were found.
+
+        Then nothing here tells them apart: what a fit to these data does for one of them and not for the other is a
+        matter of which parameters are held in it.
+        """
+        fits = [_as_found(self.bench, each.final.fit, each) for each in (one, other)]
+        left = [self.bench.whitening(self.now.noise).flat(fit.residual * fit.scale) for fit in fits]
+        return float(np.sum((left[0] - left[1]) ** 2)) < EQUALLY_GOOD * self.now.fit.unit
 
     def worth(self, selection: Selection, position: int, beside: Transfer | None = None) -> Transfer:
         """What one effect of another selection is worth on the same data, by its position in the model.

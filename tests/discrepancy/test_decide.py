@@ -91,7 +91,8 @@ def test_what_takes_more_parameters_is_taken_where_the_other_motion_asks_for_it_
         (120.0, "spring_hysteresis", []),
     ],
 )
-def test_both_motions_together_decide_about_what_is_a_little_behind(rivals, behind, name, left):
+@pytest.mark.parametrize("alike", [False, True])
+def test_both_motions_together_decide_about_what_is_a_little_behind(rivals, behind, name, left, alike):
     """100 less on the other motion, and 13.8 tell two apart: the odds of one motion are worth those of the other."""
     bench, _, start, fits = rivals
     position = len(start.fit.effects)
@@ -112,6 +113,11 @@ def test_both_motions_together_decide_about_what_is_a_little_behind(rivals, behi
         def again(self, selection):
             return There(selection)
 
+        def foretell_the_same(self, one, other):
+            return alike
+
+    if alike:  # then the other motion tells nothing, whatever a fit to it makes of either
+        name, left = "spring_hysteresis", [] if behind else ["spring_offset"]
     own = Selection(start, Settled(fits["spring_hysteresis"], start.noise), 1, (1e-9,))
     listed = {position: (Alternative("spring_offset", JOINT, 1.0, fits["spring_offset"], behind=behind),)}
     selection, alternatives, _ = decide(bench, own, listed, There(own))

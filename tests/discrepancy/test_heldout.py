@@ -59,6 +59,25 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     assert power[1] < 0.3 * power[0]
 
 
+def test_what_foretells_the_same_of_another_motion_is_told_apart_by_nothing_there(ripple, with_ripple):
+    """A constant in a spring and another zero of its encoder: the same torque, but for what the link weighs there."""
+    bench, selection = ripple
+    found, _ = held_out(bench, selection, with_ripple)
+    fit, springs = selection.final.fit, {}
+    stiffness = fit.parameters["knee.spring_stiffness"]
+    for size in (1e-5, 0.02):
+        zero = bench.predicted((*fit.effects, make_effect("encoder_offset", "knee", offset=size)), fit.parameters)
+        constant = {**fit.parameters, "knee.spring_offset": stiffness * size}
+        springs[size] = [
+            replace(selection, final=Settled(each, selection.final.noise), added=2)
+            for each in (zero, bench.predicted((*fit.effects, make_effect("spring_offset", "knee")), constant))
+        ]
+    assert found.foretell_the_same(*springs[1e-5])
+    # where it is large the spring stiffens with it, and the link hangs otherwise
+    assert not found.foretell_the_same(*springs[0.02])
+    assert not found.foretell_the_same(springs[1e-5][0], selection)
+
+
 def test_nothing_is_tested_on_a_torque_of_the_wrong_sign(ripple, with_ripple):
     kind = "current_ankle"
     found, said = held_out(*ripple, with_ripple.replace_columns({kind: -with_ripple.columns[kind]}))

@@ -1,0 +1,53 @@
+"""Springs whose stiffness comes out below zero are searched without their cubic term.
+
+Where the deflection stays on one side of zero and varies little, a negative stiffness and a huge cubic one bend to
+anything smooth: what the model lacks there, as another zero of an encoder, then seems to be nothing.
+"""
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.effects import Effect
+from sea_ident.effects.spring_stiffening import SpringStiffening
+from sea_ident.robot import Robot
+
+CERTAIN = 5.0
+"""Standard deviations by which a stiffness must be below zero."""
+
+
+def impossible_springs(bench: Bench, fit: Fit) -> dict[str, float]:
+    """Stiffness of the springs with a cubic term of which it is below zero beyond doubt, by joint [N m/rad]."""
+    names = [column.name for column in fit.columns]
+    stds: dict[str, float] = dict(zip(names, np.linalg.norm(fit.covariance_factor, axis=1), strict=False))
+    found = {}
+    for effect in bench.effects:
+        if _is_cubic(effect):
+            name = f"{effect.joint}.spring_stiffness"
+            if fit.parameters.get(name, 0.0) < -CERTAIN * stds.get(name, 0.0):
+                found[str(effect.joint)] = fit.parameters[name]
+    return found
+
+
+def without_cubic(bench: Bench, joints: Collection[str]) -> Bench:
+    """The same recording and a model without the cubic terms of some springs."""
+    return bench.modelling([e for e in bench.effects if not (_is_cubic(e) and e.joint in joints)])
+
+
+def left_without_cubic(robot: Robot, stiffness: Mapping[str, float]) -> tuple[str, ...]:
+    """What was left out, in words: stiffness by joint, as it comes out with the cubic term [N m/rad]."""
+    notes = []
+    for name, value in stiffness.items():
+        joint = robot.joints[robot.index(name)]
+        notes.append(
+            f"spring of {name}: with its cubic term its stiffness comes out as {value:.3g} {joint.torque_unit}/"
+            f"{joint.position_unit}, which no spring has; it was compared without. The deflection varies too little to "
+            "tell such a term, and it stood in for what the model lacks"
+        )
+    return tuple(notes)
+
+
+def _is_cubic(effect: Effect) -> bool:
+    return isinstance(effect, SpringStiffening)

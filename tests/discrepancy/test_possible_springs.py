@@ -1,0 +1,55 @@
+"""A spring that no spring can be stands in for what a model lacks, and is not taken for an answer."""
+
+import warnings
+
+import pytest
+
+from sea_ident.discrepancy import diagnose
+from sea_ident.discrepancy.possible_springs import impossible_springs, left_without_cubic, without_cubic
+from sea_ident.discrepancy.settle import settle
+from sea_ident.effects.spring_stiffening import SpringStiffening
+from sea_ident.estimation import identify
+from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.simulation import SensorNoise
+
+
+def zeros_apart(laboratory, offset, step, periods):
+    """The ankle's encoder reads a little too much, by steps that repeat in every period."""
+    sensors = SensorNoise(3e-5, 5e-6, link_resolution=step, motor_resolution=2.4e-5)
+    return laboratory.record([("encoder_offset", "ankle", [], {"offset": offset})], sensors=sensors, periods=periods)
+
+
+@pytest.mark.scenario
+def test_a_stiffness_below_zero_beyond_doubt_is_impossible(laboratory):
+    bench = laboratory.bench(zeros_apart(laboratory, 0.02, 1e-5, 8))
+    fit = settle(bench, bench.effects).fit
+    assert fit.parameters["ankle.spring_stiffness"] < 0.0
+    assert impossible_springs(bench, fit) == {"ankle": fit.parameters["ankle.spring_stiffness"]}
+    less = without_cubic(bench, ["ankle"])
+    gone = set(bench.effects) - set(less.effects)
+    assert gone == {SpringStiffening("ankle")}
+    assert len(less.effects) == len(bench.effects) - 1
+    # where there is no cubic term, none stands in for anything
+    assert impossible_springs(less, settle(less, less.effects).fit) == {}
+
+
+def test_springs_that_can_be_are_left_as_they_are(nothing_missing, leg):
+    bench, now = nothing_missing
+    assert impossible_springs(bench, now.fit) == {}
+    (text,) = left_without_cubic(leg, {"ankle": -123.4})
+    assert text.startswith("spring of ankle: with its cubic term its stiffness comes out as -123 N m/rad, which no")
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("offset", "step"), [(-0.03, 1.2e-3), (0.03, 1.2e-3)])
+def test_another_zero_is_found_though_the_steps_of_the_encoder_let_the_spring_bend_to_it(laboratory, leg, offset, step):
+    """It was told as nothing missing, or as a spring of another power, with confidence."""
+    recording = zeros_apart(laboratory, offset, step, 10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = diagnose(identify(leg, recording, period=5.0), recording)
+    assert [(m.effect, m.joint) for m in found.missing] == [("encoder_offset", "ankle")]
+    assert found.missing[0].parameters[0].value == pytest.approx(offset, rel=0.02)
+    (spring,) = [spring for spring in found.model.springs if spring.joint == "ankle"]
+    assert spring.stiffness == pytest.approx(leg.spring("ankle").stiffness, rel=0.1)
+    assert any("which no spring has; it was compared without" in text for text in found.warnings)
