@@ -58,7 +58,9 @@ def uncertainties(bench: Bench, now: Settled) -> FloatArray:
         for way, other in _as_good(bench, now, k - count, told[k], unit * (stds[k] / plain[k]) ** 2):
             told[:count] = np.maximum(told[:count], np.abs(other.values - fit.values))
             told[k] = max(told[k], way)
-    return np.asarray(np.hypot(told, by_what_is_held(bench, now)), dtype=np.float64)
+    told = np.hypot(told, by_what_is_held(bench, now))
+    straight = np.concatenate([effect.straight(bench.robot) for effect in fit.effects])
+    return np.asarray(told * np.concatenate([straight, np.ones(len(told) - len(straight))]), dtype=np.float64)
 
 
 def by_what_is_held(bench: Bench, now: Settled) -> FloatArray:

@@ -246,6 +246,13 @@ class Effect(ABC):
         """
         return None
 
+    def straight(self, robot: Robot) -> FloatArray:
+        """(k,) standard deviations of its values over those of the estimates of its columns; by default they are one.
+
+        A column that grows with its own value is a chord: what it does grows twice as fast.
+        """
+        return np.ones(len(self.columns(robot)))
+
     def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
         """A speed (N,) at whose reversal its torque jumps, with the index of the joint; None for joint and motor speed.
 

@@ -1,6 +1,6 @@
 """A base that does not stand level."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -22,6 +22,9 @@ HARDLY_SEEN = 1e-3
 """Share of the torque by a rotation about one axis below which that about the other is none, as long as its angle is 0:
 a robot that moves in an upright plane does not feel it turn about an axis in the plane, but for the digits that the
 plane was given with [-]."""
+
+LEAN = 0.1
+"""Angle at which a search looks for a rotation that is not felt as long as it is small [rad]."""
 
 FREE = ("moment_first", "moment_second")
 """The first moments about one upright axis."""
@@ -47,6 +50,9 @@ class BaseTilt(Effect):
     other joints tell the tilt, it is a parameter beside the angles; where none do, only the product of both is seen,
     and it is what the description says.
 
+    A robot that moves in an upright plane hardly feels that it leans to its side: gravity in the plane becomes less by
+    half the square of the angle. Its sign is not told.
+
     Attributes:
         joint: None, it acts on the whole robot.
         inertial: (10 b,) standard inertial parameters of all links; empty for those of the description.
@@ -54,6 +60,7 @@ class BaseTilt(Effect):
         moment_first: first moment not felt level, beyond what `inertial` has of it, across its axis [kg m].
         moment_second: the same at right angles to that [kg m].
         most: what these may be where they are free [kg m]; 0 where they are not, None where all moments are felt.
+        squared: about which of the axes nothing is felt but the square of the angle.
     """
 
     inertial: Sequence[float] = ()
@@ -61,6 +68,7 @@ class BaseTilt(Effect):
     moment_first: float = 0.0
     moment_second: float = 0.0
     most: float | None = None
+    squared: Sequence[bool] = (False, False)
 
     name: ClassVar[str] = "base_tilt"
     side: ClassVar[Side] = Side.LINK
@@ -70,6 +78,7 @@ class BaseTilt(Effect):
     def __post_init__(self) -> None:
         object.__setattr__(self, "inertial", tuple(float(value) for value in self.inertial))
         object.__setattr__(self, "angles", tuple(float(value) for value in self.angles))
+        object.__setattr__(self, "squared", tuple(bool(value) for value in self.squared))
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple[Effect, ...]:
@@ -90,9 +99,15 @@ class BaseTilt(Effect):
 
     @property
     def reservation(self) -> str | None:
-        """That the first moments are those of the description."""
+        """That the first moments are those of the description, or that a sign is not told."""
         if self.most != 0.0:
-            return None
+            if not any(square and angle for square, angle in zip(self.squared, self.angles, strict=True)):
+                return None
+            return (
+                f"{self.title} takes the robot out of the upright plane in which it moves: that makes gravity there "
+                "less by half the square of the angle, the same to either side. Gravity that is described too large "
+                "does that too"
+            )
         return (
             f"{self.title} is told as far as the description is right about the centres of mass of what turns about "
             "upright axes: a level robot does not feel them, and in these data a tilted one shows their product with "
@@ -100,8 +115,17 @@ class BaseTilt(Effect):
         )
 
     def variants(self, state: State) -> tuple["BaseTilt", ...]:
-        """With first moments that are not felt level, free where the motion tells them from the tilt."""
-        return (self.on(state),)
+        """With first moments that are not felt level, free where the motion tells them from the tilt.
+
+        And at an angle about an axis of which only its square is felt.
+        """
+        own = self.on(state)
+        sizes = np.linalg.norm(replace(own, angles=(0.0, 0.0))._felt(state), axis=(0, 1))
+        squared = tuple(bool(size < HARDLY_SEEN * np.max(sizes)) for size in sizes)
+        if any(self.angles) or not any(squared):
+            return (own,)
+        leaning = (replace(own, angles=tuple(LEAN * np.eye(2)[k]), squared=squared) for k in np.flatnonzero(squared))
+        return (own, *leaning)
 
     def on(self, state: State) -> "BaseTilt":
         """With first moments that are not felt level, free where the motion tells them from the tilt."""
@@ -119,8 +143,7 @@ class BaseTilt(Effect):
 
     def evaluate(self, state: State) -> Contribution:
         """Torque of the change of gravity over the angle."""
-        inertial = self._links(state.robot)
-        out = np.stack([state.gravity_torque(change, inertial) for change in self._changes(state.robot)], axis=2)
+        out = self._felt(state)
         sizes = np.linalg.norm(out, axis=(0, 1))
         out[:, :, (sizes < HARDLY_SEEN * np.max(sizes)) & (np.array(self.angles) == 0.0)] = 0.0
         return state.body_columns(out)
@@ -140,9 +163,23 @@ class BaseTilt(Effect):
 
     def anchored(self, anchor: Anchor) -> "BaseTilt":
         """With the inertial parameters of the model, and the angles that it has by now."""
-        found = (anchor.value(self.parameter_name(label)) for label in ("first", "second"))
+        found = [anchor.value(self.parameter_name(label)) for label in ("first", "second")]
+        # where only the square is felt, what is told at an angle is the square over that angle
+        found = [
+            np.sqrt(max(angle * value, 0.0)) if square else value
+            for value, angle, square in zip(found, self.angles, self.squared, strict=True)
+        ]
         angles = tuple(float(np.clip(angle, -LARGEST, LARGEST)) for angle in found)
         return replace(self, inertial=anchor.inertial(), angles=angles)
+
+    def straight(self, robot: Robot) -> FloatArray:
+        """Half where only the square of the angle is felt."""
+        return np.where(self.squared, 0.5, 1.0)
+
+    def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
+        """Whether gravity in the plane of the robot becomes less, where it leans out of that."""
+        leaning = zip(values, self.angles, self.squared, strict=True)
+        return all(value * angle >= 0.0 for value, angle, square in leaning if square)
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""
@@ -163,6 +200,11 @@ class BaseTilt(Effect):
         gravity = np.asarray(robot.model.gravity.linear)
         turn = sum((value * axis for value, axis in zip(values, level_axes(gravity), strict=True)), np.zeros(3))
         return with_gravity(robot, pin.exp3(-turn) @ gravity)
+
+    def _felt(self, state: State) -> FloatArray:
+        """(N, n, 2) torque of the change of gravity over each angle."""
+        inertial = self._links(state.robot)
+        return np.stack([state.gravity_torque(change, inertial) for change in self._changes(state.robot)], axis=2)
 
     def _changes(self, robot: Robot) -> FloatArray:
         """(2, 3) change of gravity over each angle, as the robot sees it [m/(s2 rad)]."""

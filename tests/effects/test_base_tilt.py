@@ -17,6 +17,7 @@ from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.recordings import Recording
 from sea_ident.regressor import inverse_dynamics, model_columns, prior_parameters
+from sea_ident.simulation import PlantedEffect, simulate
 
 PERIOD, TILT = 5.0, (0.02, 0.01)
 
@@ -169,3 +170,64 @@ def test_a_tilt_follows_the_bodies_that_are_felt():
         np.testing.assert_allclose(own[name][:, 1], (change @ angles)[:, 1], atol=1e-3 * np.abs(change @ angles).max())
     for name in ("l0.mx", "l0.my", "l1.m"):
         assert not np.any(own[name])
+
+
+def leg_leaning(angles, seed):
+    """Periods of the planar leg on a base that is tilted."""
+    leg = load_robot("exo_leg")
+    a, b = np.random.default_rng(seed).normal(0.0, 0.25, (2, leg.n, 5)) / np.arange(1, 6) ** 0.7
+    series = FourierSeries(1.0 / PERIOD, np.array([0.2, 0.5, 0.0]), a, b)
+    planted = [PlantedEffect(make_effect("base_tilt"), np.array(angles))] if any(angles) else []
+    return leg, simulate(leg, series, periods=10, seed=seed, effects=planted).recording
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("angles", [(0.1, 0.1), (0.2, 0.0)])
+def test_a_leg_that_leans_out_of_its_plane_is_told_by_less_gravity_in_it(angles):
+    """By half the square of the angle: it was told as other effects, with confidence."""
+    leg, recording = leg_leaning(angles, 5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = diagnose(identify(leg, recording, period=PERIOD), recording)
+    (tilt,) = found.missing
+    assert tilt.effect == "base_tilt"
+    told = {p.name.removeprefix("robot.base_tilt_"): p for p in tilt.parameters}
+    for name, angle in zip(("first", "second"), angles, strict=True):
+        assert abs(told[name].value - angle) < 3.0 * told[name].std
+    assert told["first"].std < 0.1 * told["first"].value
+    assert found.training.shrink > 0.9
+
+
+def test_only_the_square_of_a_small_angle_is_felt_out_of_the_plane():
+    leg = load_robot("exo_leg")
+    motion = FourierSeries(0.2, np.zeros(leg.n), *np.random.default_rng(1).normal(0.0, 0.3, (2, leg.n, 3))).sample(50.0)
+    state, plain = State(leg, motion), make_effect("base_tilt")
+    level, leaning = plain.variants(state)
+    assert (level.squared, level.angles) == ((False, False), (0.0, 0.0))
+    assert sorted(leaning.squared) == [False, True]
+    axis = leaning.squared.index(True)
+    angles = [0.0, 0.0]
+    angles[axis] = 0.17
+    effects = (*base_effects(leg), *spring_effects(leg), leaning)
+    names = [column.name for column in model_columns(leg, effects)]
+    parameters = dict(zip(names, np.nan_to_num(prior_parameters(leg, effects)), strict=True))
+    # what is estimated at another angle brings it to the right one at once
+    turned = plain.modified(leg, np.array(angles))
+    wanted = inverse_dynamics(turned, motion)[0] - inverse_dynamics(leg, motion)[0]
+    column = leaning.evaluate(state).link[:, :, axis]
+    value = float(np.sum(column * wanted) / np.sum(column**2))
+    parameters[plain.columns(leg)[axis].name] = value
+    moved = leaning.anchored(Anchor(leg, effects, parameters))
+    assert moved.angles[axis] == pytest.approx(0.17, rel=1e-3)
+    np.testing.assert_allclose(
+        moved.evaluate(state).link @ np.array(angles), wanted, atol=1e-9 + 1e-3 * np.abs(wanted).max()
+    )
+    assert leaning.plausible(np.array(angles), {})
+    assert not leaning.plausible(-np.array(angles), {})
+    assert "described too large" in moved.reservation
+    np.testing.assert_array_equal(moved.straight(leg), np.where(moved.squared, 0.5, 1.0))
+    # a robot that moves in space feels both
+    arm = load_robot("hebi_x5")
+    still = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 20, arm.n))
+    everywhere = State(arm, Motion(np.arange(20) / 100.0, *still, *still))
+    assert all(not any(tilt.squared) for tilt in plain.variants(everywhere))
