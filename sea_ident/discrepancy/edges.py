@@ -49,6 +49,12 @@ gets, finer edges do not make a push the better one."""
 COARSE_STEP = 1.0 / 4.0
 """That part: what a large push leaves by edges that are half a sample off is far above all noise."""
 
+FARTHEST = 32.0
+"""Samples within which it is asked how sure the edges of a push are, ..."""
+
+TWO_DEVIATIONS = 4.0
+"""... by what the statistic rises by two standard deviations away."""
+
 NEARLY = 1e-12
 """Share of a period by which a push is shorter than all of it."""
 
@@ -230,7 +236,42 @@ def _best_window(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, strid
 def _best_edges(
     bench: Bench, fit: Fit, noise: NoiseFloor, position: int, firsts: FloatArray, lasts: FloatArray
 ) -> tuple[float, float, bool]:
-    """The best of some begins and ends [s] of a push, and whether one of them is the first or the last of its kind.
+    """The best of some begins and ends [s] of a push, and whether one of them is the first or the last of its kind."""
+    wanted = _gains_with_edges(bench, fit, noise, position, firsts, lasts)
+    a, b = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
+    at_an_end = a in (0, len(firsts) - 1) or b in (0, len(lasts) - 1)
+    period = bench.data.period
+    return float(np.mod(firsts[a], period)), float(np.mod(lasts[b], period)), bool(at_an_end)
+
+
+def edge_stds(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> dict[str, float]:
+    """Standard deviations of when a push begins and ends, by name [s].
+
+    Half of how far it may be while the fit stays as good but for two standard deviations. Where samples are left out,
+    as around a reversal of the only joint that it moves, it may be anywhere in these.
+
+    Args:
+        bench: the recording.
+        fit: the model.
+        noise: noise floor.
+        position: of the push among its effects.
+    """
+    push, sample = fit.effects[position], bench.data.period / bench.data.samples
+    moves: FloatArray = sample * FINE_STEP * np.arange(-round(FARTHEST / FINE_STEP), round(FARTHEST / FINE_STEP) + 1.0)
+    found = {}
+    for k, name in enumerate(WHEN):
+        edges = [np.array([float(getattr(push, each))]) for each in WHEN]
+        edges[k] = edges[k] + moves
+        gains = _gains_with_edges(bench, fit, noise, position, edges[0], edges[1]).ravel()
+        good = gains > gains[len(moves) // 2] - TWO_DEVIATIONS * fit.unit
+        found[name] = max(0.5 * float(np.max(np.abs(moves[good]))), sample * FINEST_STEP)
+    return found
+
+
+def _gains_with_edges(
+    bench: Bench, fit: Fit, noise: NoiseFloor, position: int, firsts: FloatArray, lasts: FloatArray
+) -> FloatArray:
+    """(a, b) drop of the statistic by a push with each of some begins (a,) and ends (b,) [s]; of none it is -inf.
 
     Compared beside the rest of the model as it is with the push: without it that may bend far.
     """
@@ -249,10 +290,7 @@ def _best_edges(
     times = [np.mod(each + half, period) - half for each in (firsts, lasts)]
     instants, columns = _windows(bench, rest, noise, np.unique(np.concatenate(times)))
     i, j = (np.argmin(np.abs(instants[:, None] - each), axis=0) for each in times)
-    wanted = np.where(i[:, None] == j, -np.inf, _window_gains(columns, rest.left, i, j))
-    a, b = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
-    at_an_end = a in (0, len(firsts) - 1) or b in (0, len(lasts) - 1)
-    return float(np.mod(firsts[a], period)), float(np.mod(lasts[b], period)), bool(at_an_end)
+    return np.where(i[:, None] == j, -np.inf, _window_gains(columns, rest.left, i, j))
 
 
 @dataclass(frozen=True, eq=False)

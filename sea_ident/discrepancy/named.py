@@ -7,6 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.edges import edge_stds
 from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter, Unseen
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
@@ -22,6 +23,7 @@ from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.discrepancy.unseen import beside_others
 from sea_ident.effects import Effect, Shape, Side
 from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.estimation.spring_untold import told_by_rest, untold
 from sea_ident.estimation.springs import spring_columns
@@ -62,7 +64,9 @@ def named_effects(
         there = beside.get(fit.effects[position].joint or "", ())
         shifts = [*other_models, *(each.shift for each in there if each.better)]
         stds = np.max([plain, *(np.hypot(plain, shift) for shift in shifts)], axis=0)
-        found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free)
+        pushes = isinstance(fit.effects[position], ExternalForce)
+        edges = edge_stds(bench, fit, selection.final.noise, position) if pushes else {}
+        found = named_effect(bench, fit, position, stds, selection.p_values[k], others, free, edges)
         wider = [
             (each.effect, named_effect(bench, fit, position, np.hypot(stds, each.stds), 1.0, (), free).parameters)
             for each in there
@@ -130,6 +134,7 @@ def named_effect(
     p_value: float,
     alternatives: Sequence[Alternative],
     free: Sequence[tuple[int, Shape]] | None = None,
+    edges: Mapping[str, float] | None = None,
 ) -> MissingEffect:
     """An effect that was found, with the numbers that are told of it.
 
@@ -141,6 +146,7 @@ def named_effect(
         p_value: probability of finding as much where nothing is missing.
         alternatives: what else it may be.
         free: (s,) shapes that are free; those of the fit by default.
+        edges: standard deviations of when a push begins and ends, by name [s].
     """
     effect, counts = fit.effects[position], bench.counts(fit.effects)
     own = range(sum(counts[:position]), sum(counts[: position + 1]))
@@ -158,7 +164,7 @@ def named_effect(
     at_rest = bool(len(values)) and bool(np.all(by_rest > 0.0))
     own_free = [(len(fit.columns) + k, s) for k, (owner, s) in enumerate(free or fit.free_shapes) if owner == position]
     stds_of = {shape.name: (float(stds[place]), shape) for place, shape in own_free}
-    parameters.extend(_shape_parameters(bench, effect, stds_of, at_rest))
+    parameters.extend(_shape_parameters(bench, effect, stds_of, edges or {}, at_rest))
     return MissingEffect(
         effect=effect.name,
         joint=effect.joint,
@@ -207,13 +213,17 @@ def _told_by_rest(bench: Bench, fit: Fit, effect: Effect, values: FloatArray) ->
 
 
 def _shape_parameters(
-    bench: Bench, effect: Effect, stds: Mapping[str, tuple[float, Shape]], at_rest: bool
+    bench: Bench,
+    effect: Effect,
+    stds: Mapping[str, tuple[float, Shape]],
+    edges: Mapping[str, float],
+    at_rest: bool,
 ) -> list[MissingParameter]:
     """The shapes of an effect; what is at rest all the time does not show where it would not be."""
     out = []
     for shape in effect.ranges:
         value = float(getattr(effect, shape.name))
-        std = 0.0
+        std = edges.get(shape.name, 0.0)
         if shape.name in stds:
             step, free = stds[shape.name]
             std = step * abs(value) if free.logarithmic else step * (free.upper - free.lower)

@@ -16,12 +16,14 @@ from sea_ident.discrepancy.edges import (
     _Rest,
     _windows,
     at_centre,
+    edge_stds,
     stays_on_the_centre,
     with_sharp_edges,
     without_another,
 )
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.linear import whiten
+from sea_ident.discrepancy.named import named_effects
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import Selection, _eliminate, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
@@ -295,3 +297,22 @@ def test_a_push_on_a_centre_of_mass_needs_no_point(pushed):
     begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
     (*_, push) = with_sharp_edges(bench, begun, now.noise, len(now.fit.effects)).effects
     assert not any(getattr(push, name) for name in POINT)
+
+
+@pytest.mark.scenario
+def test_an_edge_among_samples_that_are_left_out_may_be_anywhere_in_these(laboratory):
+    """The hip's link reverses while the push on it begins: from a sample before to four samples later all fit alike."""
+    push = make_effect("external_force", "hip", start=1.0, stop=1.8, period=PERIOD)
+    bench = laboratory.bench(laboratory.record([(push, [40.0, 0.0, 20.0])], periods=10))
+    sample = PERIOD / bench.data.samples
+    late = replace(push, start=1.0184)
+    now = settle(bench, (*bench.effects, late))
+    stds = edge_stds(bench, now.fit, now.noise, len(bench.effects))
+    assert 1.5 * sample < stds["start"] < 3.0 * sample
+    assert stds["stop"] < 0.1 * sample
+    # what is told of it says so
+    selection = Selection(settle(bench, bench.effects), now, 1, (1e-9,))
+    (told,) = named_effects(bench, selection, {}, None)
+    std_of = {p.name.removeprefix("hip.external_force_"): p.std for p in told.parameters}
+    assert (std_of["start"], std_of["stop"]) == (stds["start"], stds["stop"])
+    assert std_of["point_x"] == 0.0
