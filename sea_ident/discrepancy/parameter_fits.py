@@ -21,8 +21,8 @@ from sea_ident.effects import Column, Effect
 from sea_ident.regressor import prior_parameters
 from sea_ident.reversals import around_reversal
 
-MOST_FIT_STEPS = 10
-"""Largest number of steps of a fit; a model that is right needs two."""
+MOST_FIT_STEPS = 30
+"""Largest number of steps of a fit; a model that is right needs two, one without what its springs need twenty."""
 
 LEAST_STIFFNESS = 0.02
 """Share of the stiffness of the first fit below which that of another no longer scales its link equation."""

@@ -317,6 +317,9 @@ class _Elimination:
         without = bench.refine(others, noise, start=fit.parameters, only=first)
         if is_push(effect):
             without = without_another(bench, without, noise, effect, first)
+        elif any(is_push(other) for other in others[first:]):
+            # what bent the edges of a push is not needed for them
+            without = sharpened(bench, without, noise, first)
         loss = without.statistic - fit.statistic
         columns = max(len(effect.columns(bench.robot)), 1)
         visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)

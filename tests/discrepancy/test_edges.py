@@ -154,6 +154,20 @@ def test_two_pushes_at_once_make_room_for_one_off_the_centre_of_mass(laboratory)
 
 
 @pytest.mark.scenario
+@pytest.mark.parametrize("late", [0.6, 1.2])
+def test_what_was_found_beside_the_wrong_edges_of_a_push_is_not_needed_for_them(laboratory, late):
+    """A link that bends a little makes up for a push that begins too late, and was kept with it."""
+    push = make_effect("external_force", "knee", start=1.3, stop=2.0, period=PERIOD)
+    bench = laboratory.bench(laboratory.record([(push, [20.0, 0.0, -60.0])], periods=10))
+    wrong = replace(push, start=1.3 + late * PERIOD / bench.data.samples)
+    now = settle(bench, (*bench.effects, wrong, make_effect("link_flexibility", "knee", compliance=1e-4)))
+    left, p_values = _eliminate(bench, now, [1e-9, 1e-9], 100)
+    assert [effect.name for effect in left.fit.effects[len(bench.effects) :]] == ["external_force"]
+    assert len(p_values) == 1
+    assert left.fit.statistic < 1.2 * left.fit.dof < 0.2 * now.fit.statistic
+
+
+@pytest.mark.scenario
 def test_the_best_window_is_the_one_that_fits_best(pushed):
     bench, now = pushed
     effect = make_effect("external_force", "knee", start=1.0, stop=2.0, period=PERIOD)

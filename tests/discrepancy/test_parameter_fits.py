@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.fit import Known
+from sea_ident.discrepancy.possible_springs import without_cubic
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects import make_effect
 
@@ -35,6 +36,17 @@ def test_a_fit_stands_where_no_parameter_brings_the_statistic_down(rippled):
     slope = columns.T @ fit.whitened / np.where(lengths > 0.0, lengths, 1.0)
     # a standard deviation is one
     assert np.abs(slope).max() < 0.05
+
+
+@pytest.mark.scenario
+def test_a_fit_gets_there_from_far_away_whatever_else_is_wrong(laboratory):
+    """A spring four times too stiff beside another zero of its encoder: ten steps ended 47 times above the minimum."""
+    bench = laboratory.bench(laboratory.record([("encoder_offset", "knee", [], {"offset": -0.1})], periods=8))
+    less = without_cubic(bench, ["knee"])
+    right = settle(less, (*less.effects, make_effect("encoder_offset", "knee", offset=-0.1)))
+    start = {**right.fit.parameters, "knee.spring_stiffness": 4.0 * right.fit.parameters["knee.spring_stiffness"]}
+    fits = [less.fit(less.effects, right.noise, start=each) for each in (start, right.fit.parameters)]
+    assert fits[0].statistic == pytest.approx(fits[1].statistic, rel=1e-3)
 
 
 def test_a_planted_effect_is_fitted_within_its_own_standard_errors(rippled):
