@@ -1,7 +1,9 @@
 """A spring that no spring can be stands in for what a model lacks, and is not taken for an answer."""
 
 import warnings
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sea_ident.discrepancy import diagnose
@@ -38,6 +40,16 @@ def test_springs_that_can_be_are_left_as_they_are(nothing_missing, leg):
     assert impossible_springs(bench, now.fit) == {}
     (text,) = left_without_cubic(leg, {"ankle": -123.4})
     assert text.startswith("spring of ankle: with its cubic term its stiffness comes out as -123 N m/rad, which no")
+
+
+@pytest.mark.parametrize(("stiffness", "impossible"), [(-6.0, True), (-4.0, False), (4.0, False)])
+def test_a_stiffness_that_is_hardly_known_may_be_below_zero(nothing_missing, stiffness, impossible):
+    bench, _ = nothing_missing
+    name = "ankle.spring_stiffness"
+    fit = SimpleNamespace(
+        columns=(SimpleNamespace(name=name),), parameters={name: stiffness}, covariance_factor=np.array([[0.6, 0.8]])
+    )
+    assert impossible_springs(bench, fit) == ({"ankle": stiffness} if impossible else {})
 
 
 @pytest.mark.scenario
