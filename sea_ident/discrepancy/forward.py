@@ -131,7 +131,7 @@ def simulation_gap(
     gaps, unseen = {}, {}
     for kind in SIGNALS:
         both = [np.concatenate([part[kind] for part in model]) for model in deviations]
-        floor = SEEN * spread_of_power(_of_periods(processed, kind)[:, :: every_which(processed)])
+        floor = SEEN * spread_of_power(_of_periods(processed, kind)[:, :: stride_of(processed)])
         powers = [common_power(values) for values in both]
         seen = np.any([power > floor for power in powers], axis=0)
         rms = [np.sqrt(np.where(seen, np.maximum(power, 0.0), 0.0)) for power in powers]
@@ -156,13 +156,13 @@ def _of_periods(processed: ProcessedRecording, kind: str) -> FloatArray:
 
 def deviations_of(run: dict[str, FloatArray], part: ProcessedRecording, own: bool) -> dict[str, FloatArray]:
     """Deviations (k, N', n) of a simulation, by signal: from every period, or from the mean of periods of its own."""
-    every = every_which(part)
-    found = {kind: run[kind] - _of_periods(part, kind)[:, ::every] for kind in SIGNALS}
+    stride = stride_of(part)
+    found = {kind: run[kind] - _of_periods(part, kind)[:, ::stride] for kind in SIGNALS}
     return {kind: values.mean(axis=0, keepdims=True) for kind, values in found.items()} if own else found
 
 
-def every_which(processed: ProcessedRecording) -> int:
-    """Every which sample of a period is simulated: as few as `RATE` allows."""
+def stride_of(processed: ProcessedRecording) -> int:
+    """Stride from one simulated sample of a period to the next: as long as `RATE` allows."""
     samples = processed.samples
     most = max(int(samples / (RATE * (processed.period or np.inf))), 1)
     return max(k for k in range(1, most + 1) if samples % k == 0)
@@ -171,14 +171,14 @@ def every_which(processed: ProcessedRecording) -> int:
 def simulated(model: Model, command: Command, processed: ProcessedRecording) -> dict[str, FloatArray]:
     """Samples (N', n) of one period of q, theta and tau as sensors without noise see them.
 
-    After a lead from the measured state; every so many samples of the recording (`every_which`).
+    After a lead from the measured state; at every so many samples of the recording (`stride_of`).
 
     Raises:
         SeaIdentError: the model cannot be simulated, or its motion diverges.
     """
     built = plant_from_identified(model)
-    every, period = every_which(processed), command.reference.period
-    samples = processed.samples // every
+    stride, period = stride_of(processed), command.reference.period
+    samples = processed.samples // stride
     remembers = any(isinstance(planted.effect, MemoryEffect) for planted in built.effects)
     lead = samples if remembers else min(ceil(LEAD / period * samples), samples)
     first = samples - lead
@@ -197,7 +197,7 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
             plant=plant,
             effects=built.effects,
             rate=samples / period,
-            start=actual(model, processed)[0][first * every : first * every + 1],
+            start=actual(model, processed)[0][first * stride : first * stride + 1],
             lead=lead * period / samples,
         )
     recorded, robot = run.recording, model.robot

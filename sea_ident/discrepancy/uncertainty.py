@@ -59,8 +59,8 @@ def uncertainties(bench: Bench, now: Settled) -> FloatArray:
             told[:count] = np.maximum(told[:count], np.abs(other.values - fit.values))
             told[k] = max(told[k], way)
     told = np.hypot(told, by_what_is_held(bench, now))
-    straight = np.concatenate([effect.straight(bench.robot) for effect in fit.effects])
-    return np.asarray(told * np.concatenate([straight, np.ones(len(told) - len(straight))]), dtype=np.float64)
+    told[:count] *= np.concatenate([effect.std_factors(bench.robot) for effect in fit.effects])
+    return np.asarray(told, dtype=np.float64)
 
 
 def by_what_is_held(bench: Bench, now: Settled) -> FloatArray:

@@ -246,10 +246,10 @@ class Effect(ABC):
         """
         return None
 
-    def straight(self, robot: Robot) -> FloatArray:
-        """(k,) standard deviations of its values over those of the estimates of its columns; by default they are one.
+    def std_factors(self, robot: Robot) -> FloatArray:
+        """(k,) standard deviations of its values over those that a linear fit gives its columns; by default one.
 
-        A column that grows with its own value is a chord: what it does grows twice as fast.
+        For a column that itself grows with its value (`anchored`): what it does grows faster than the column says.
         """
         return np.ones(len(self.columns(robot)))
 

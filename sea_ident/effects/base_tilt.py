@@ -172,7 +172,7 @@ class BaseTilt(Effect):
         angles = tuple(float(np.clip(angle, -LARGEST, LARGEST)) for angle in found)
         return replace(self, inertial=anchor.inertial(), angles=angles)
 
-    def straight(self, robot: Robot) -> FloatArray:
+    def std_factors(self, robot: Robot) -> FloatArray:
         """Half where only the square of the angle is felt."""
         return np.where(self.squared, 0.5, 1.0)
 

@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.command import command_of
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.forward import SameDrive, every_which, simulated, simulation_gap
+from sea_ident.discrepancy.forward import SameDrive, simulated, simulation_gap, stride_of
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify
 from sea_ident.simulation import Controller, FrictionJitter, PlantedEffect, SensorNoise, VelocityController, simulate
@@ -72,7 +72,7 @@ def test_of_many_samples_a_second_as_many_are_simulated_as_are_usual(leg, series
         recording = other if reference else without_reference(other)
         processed = wide_processing(recording, leg, PERIOD)
         gaps.append(simulation_gap(*models, recording, processed).gaps["q"])
-    assert every_which(processed) == 5
+    assert stride_of(processed) == 5
     run = simulated(models[1], command_of(models[1], recording, processed, None), processed)
     assert {len(values) for values in run.values()} == {processed.samples // 5}
     there, late = (np.linalg.norm(run["q"] - np.roll(processed.motion.q, k, axis=0)[::5]) for k in (0, 5))

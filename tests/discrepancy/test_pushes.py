@@ -1,14 +1,16 @@
 """Pushes are found to the sample where they are, and none where nothing pushes."""
 
 import warnings
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 import sea_ident
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.pushes import find_pushes, pushed, repeated
+from sea_ident.discrepancy.pushes import Push, find_pushes, pushed, repeated
 from sea_ident.discrepancy.unrepeated import pushes_between_passes
+from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
 
 PERIOD = 5.0
@@ -151,6 +153,29 @@ def test_friction_that_differs_from_pass_to_pass_is_no_push(laboratory, periods,
         model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
         processed = wide_processing(recording, laboratory.leg, PERIOD)
         assert pushes_between_passes(model, recording, processed) == ()
+
+
+@pytest.mark.scenario
+def test_a_push_that_the_refitted_model_does_not_show_gives_no_mean_up(laboratory, monkeypatch):
+    """One pass of five seemed to be pushed beside the model as it was given; there is nothing of it after a refit."""
+    seeming = Push(1, 12.3, 12.4, 0.5, 0.04, 15.0)
+    module = import_module("sea_ident.discrepancy.diagnose")
+    monkeypatch.setattr(module, "pushes_between_passes", lambda *_: (seeming,))
+    push = make_effect("external_force", "knee", start=12.0, stop=12.6)
+    said = []
+    for planted in ((), [(push, [20.0, 0.0, 10.0])]):
+        recording = laboratory.record(planted, periods=5)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeaIdentWarning)
+            model = sea_ident.identify(laboratory.leg, recording, period=PERIOD)
+            said.append(sea_ident.diagnose(model, recording))
+    assert (said[0].verdict, said[0].missing) == ("none", ())
+    assert said[0].lack_of_fit.dof > 0
+    # where one pushes, the mean is of no use
+    assert "external_force" in {missing.effect for missing in said[1].missing}
+    assert said[1].lack_of_fit.dof == 0
+    starts = [p.value for missing in said[1].missing for p in missing.parameters if p.name.endswith("first_start")]
+    assert starts == pytest.approx([12.0] * len(starts), abs=0.02)
 
 
 def test_a_reversal_at_which_the_joint_lingers_is_no_push():

@@ -176,7 +176,7 @@ def test_what_the_library_lacks_is_not_named_by_a_part_of_it(softening, monkeypa
 @pytest.mark.scenario
 @pytest.mark.parametrize(("share", "unnamed"), [(0.1, False), (0.4, True)])
 def test_what_a_large_drift_leaves_by_its_form_is_no_other_trend(laboratory, leg, share, unnamed):
-    """Beside friction that doubles, a torque that swings and grows with time, as no effect does."""
+    """Beside friction that becomes ten times as large, a torque that swings and grows with time, as no effect does."""
     recording = laboratory.record([("friction_drift", "knee", [0.0, 10.0], {})], periods=16)
     since = recording.time - recording.time[0]
     drive = leg.joints[1].actuator

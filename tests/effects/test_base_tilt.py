@@ -177,8 +177,8 @@ def leg_leaning(angles, seed):
     leg = load_robot("exo_leg")
     a, b = np.random.default_rng(seed).normal(0.0, 0.25, (2, leg.n, 5)) / np.arange(1, 6) ** 0.7
     series = FourierSeries(1.0 / PERIOD, np.array([0.2, 0.5, 0.0]), a, b)
-    planted = [PlantedEffect(make_effect("base_tilt"), np.array(angles))] if any(angles) else []
-    return leg, simulate(leg, series, periods=10, seed=seed, effects=planted).recording
+    planted = PlantedEffect(make_effect("base_tilt"), np.array(angles))
+    return leg, simulate(leg, series, periods=10, seed=seed, effects=[planted]).recording
 
 
 @pytest.mark.scenario
@@ -225,7 +225,7 @@ def test_only_the_square_of_a_small_angle_is_felt_out_of_the_plane():
     assert leaning.plausible(np.array(angles), {})
     assert not leaning.plausible(-np.array(angles), {})
     assert "described too large" in moved.reservation
-    np.testing.assert_array_equal(moved.straight(leg), np.where(moved.squared, 0.5, 1.0))
+    np.testing.assert_array_equal(moved.std_factors(leg), np.where(moved.squared, 0.5, 1.0))
     # a robot that moves in space feels both
     arm = load_robot("hebi_x5")
     still = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 20, arm.n))
