@@ -28,7 +28,13 @@ from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_experiment import with_next_experiment
-from sea_ident.discrepancy.possible_springs import impossible_springs, left_without_cubic, without_cubic
+from sea_ident.discrepancy.own_zeros import own_zeros
+from sea_ident.discrepancy.possible_springs import (
+    impossible_springs,
+    left_without_cubic,
+    with_constants,
+    without_cubic,
+)
 from sea_ident.discrepancy.repaired import repair, with_repaired
 from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
@@ -45,6 +51,7 @@ from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
 from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.estimation.torque_units import other_torque_units
+from sea_ident.estimation.unknown_zeros import with_its_zeros, with_zeros
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording
@@ -104,9 +111,39 @@ def diagnose(
             check.clock_in_seconds(given)
     if holdout is not None:
         not_the_same(recording, holdout)
+    period = period or _period_of(model, recording)
+    elsewhere: dict[str, float] = {}
+    recording, zeros = with_its_zeros(model, recording, period)
+    if holdout is not None:
+        holdout, elsewhere = with_its_zeros(model, holdout, None)
+    diagnosis = _diagnosed(model, recording, holdout, reference, period, controller, tell)
+    said = words.fitted_zeros(robot, zeros, elsewhere)
+    found = diagnosis.model
+    diagnosis = replace(
+        diagnosis,
+        warnings=(*said, *diagnosis.warnings),
+        model=None if found is None else with_zeros(found, zeros),
+    )
+    tell("done", 1.0)
+    for text in diagnosis.warnings:
+        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
+    return diagnosis
+
+
+def _diagnosed(
+    model: Model,
+    recording: Recording | ProcessedRecording,
+    holdout: Recording | ProcessedRecording | None,
+    reference: Model | None,
+    period: float | None,
+    controller: Controller | None,
+    tell: Progress,
+) -> Diagnosis:
+    """The diagnosis of recordings in which theta and q have common zeros, but for what it finds."""
+    robot = model.robot
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", SeaIdentWarning)
-        processed = wide_processing(recording, robot, period or _period_of(model, recording))
+        processed = wide_processing(recording, robot, period)
     if processed.period is None or processed.periods < 2:
         return diagnose_unrepeated(model, processed, recording)
     recording = processed.used_of(recording)
@@ -172,11 +209,7 @@ def diagnose(
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
-    diagnosis = replace(diagnosis, units=check.torque_units(robot))
-    tell("done", 1.0)
-    for text in diagnosis.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=4)
-    return diagnosis
+    return replace(diagnosis, units=check.torque_units(robot))
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,25 +232,27 @@ def _searched_with_possible_springs(bench: Bench, changing: Changing, tell: Prog
     impossible = impossible_springs(bench, found.confirmed.final.fit)
     if not impossible:
         return found
-    other = _searched_beyond_steps(without_cubic(bench, impossible), changing, tell)
+    without = without_cubic(bench, impossible)
+    other = _searched_beyond_steps(without, changing, tell, with_constants(without, impossible))
     if any(other.confirmed.final.fit.parameters[f"{joint}.spring_stiffness"] < 0.0 for joint in impossible):
         return found
     return replace(other, notes=(*other.notes, *left_without_cubic(bench.robot, impossible)))
 
 
-def _searched_beyond_steps(bench: Bench, changing: Changing, tell: Progress) -> _Found:
+def _searched_beyond_steps(bench: Bench, changing: Changing, tell: Progress, begun: Selection | None = None) -> _Found:
     """Search, unless the steps of the encoders may be all that is left."""
     if bench.data.step_errors is not None and steps_cover(bench, settle(bench, bench.effects)):
         return _unsearched(bench, changing)
-    return _searched(bench, changing, tell)
+    return _searched(bench, changing, tell, begun)
 
 
-def _searched(bench: Bench, changing: Changing, tell: Progress) -> _Found:
+def _searched(bench: Bench, changing: Changing, tell: Progress, begun: Selection | None = None) -> _Found:
     """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
-    start = settle(bench, bench.effects)
-    before = changing.compared(bench, start.fit)
-    less = changing.less(bench, start.fit, before)
-    found = _searched_mean(less, changing, tell, start=start if less is bench else None)
+    start = settle(bench, bench.effects) if begun is None else begun.start
+    seen = start.fit if begun is None else begun.final.fit
+    before = changing.compared(bench, seen)
+    less = changing.less(bench, seen, before)
+    found = _searched_mean(less, changing, tell, begun, start if less is bench else None)
     if found.trends.names != before.names and not (less is bench and _lacks_more(found)):
         first = found.confirmed
         nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
@@ -365,7 +400,7 @@ def _unsearched(bench: Bench, changing: Changing) -> _Found:
 
 def model_effects(model: Model) -> tuple[Effect, ...]:
     """Effects of a model with its springs, and what else is in them, among them."""
-    return (*model.effects, *spring_effects(model.robot), *model.spring_effects)
+    return (*model.effects, *spring_effects(model.robot), *model.spring_effects, *own_zeros(model))
 
 
 def _period_of(model: Model, recording: Recording | ProcessedRecording) -> float | None:

@@ -23,6 +23,7 @@ from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.estimation import Model
+from sea_ident.estimation.unknown_zeros import unknown_zeros
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -123,9 +124,8 @@ def simulation_gap(
             return SimulationGap({}, tuple(notes))
         deviations.append([deviations_of(run, part, len(parts) > 1) for run, part in zip(runs, parts, strict=True)])
     names = before.robot.joint_names
-    remembering = [
-        names.index(effect.required_joint) for effect in after.spring_effects if isinstance(effect, SpringHysteresis)
-    ]
+    slipping = {e.required_joint for e in after.spring_effects if isinstance(e, SpringHysteresis)}
+    remembering = [names.index(joint) for joint in sorted(slipping | set(unknown_zeros(after)))]
     for part in (part for model in deviations for part in model):
         part["q"][..., remembering] -= part["q"][..., remembering].mean(axis=1, keepdims=True)
     gaps, unseen = {}, {}

@@ -14,6 +14,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.gap import gap_of, torque_by_joint
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
+from sea_ident.discrepancy.own_zeros import joints_with_own_zeros
 from sea_ident.discrepancy.same import RUNS_DIFFER, same_motion
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle_again
@@ -205,14 +206,15 @@ def _fitted_anew(other: Bench, selection: Selection, noise: NoiseFloor | None = 
 
 def _as_found(other: Bench, fit: Fit, selection: Selection) -> Fit:
     """One of the models of a selection with its parameters as they are."""
-    return without_history(other, other.predicted(fit.effects, fit.parameters), selection.joints_of(SpringHysteresis))
+    joints = selection.joints_of(SpringHysteresis) | joints_with_own_zeros(fit.effects)
+    return without_history(other, other.predicted(fit.effects, fit.parameters), joints)
 
 
 def without_history(bench: Bench, fit: Fit, joints: Collection[str]) -> Fit:
     """A model with given parameters less what springs with dry friction may remember of the time before.
 
     Where such a spring rests depends on how it was loaded last: a constant that no periodic motion tells, and none
-    takes along to another.
+    takes along to another. So is the zero of an encoder that counts from where it was switched on.
 
     Args:
         bench: the recording.

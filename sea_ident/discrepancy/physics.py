@@ -16,6 +16,7 @@ from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.presliding_friction import PreslidingFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
@@ -115,7 +116,7 @@ def is_of_a_law(effect: Effect) -> TypeGuard[AsymmetricSpring | SpringStiffening
 
 def is_term(effect: Effect) -> bool:
     """Whether an effect is a term more in a law that the model has: of a spring, or of viscous friction."""
-    return is_of_a_law(effect) or isinstance(effect, NonlinearViscousFriction)
+    return is_of_a_law(effect) or isinstance(effect, NonlinearViscousFriction | SpringOffset)
 
 
 def brakes(bench: Bench, fit: Fit, position: int) -> bool:
@@ -207,7 +208,10 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
         return False  # where it ends beside what came after it, too
     if not pushes_back(bench, fit, position) or not brakes(bench, fit, position) or not builds_up(fit, position):
         return False
-    if is_term(effect):
+    # a zero that is far off is a constant of many times what the spring carries, as its stiffness times that
+    if isinstance(effect, SpringOffset) and fit.parameters.get(f"{effect.joint}.{SPRING_LAW[0]}", 0.0) > 0.0:
+        return True
+    if is_term(effect) and not isinstance(effect, SpringOffset):
         return True  # terms of one law cancel in part, and what they come to is asked above
     total = np.sqrt(np.sum(np.abs(bench.column_spectra(effect, fit.effects) @ values) ** 2, axis=0))
     return not np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms)

@@ -2,6 +2,9 @@
 
 Where the deflection stays on one side of zero and varies little, a negative stiffness and a huge cubic one bend to
 anything smooth: what the model lacks there, as another zero of an encoder, then seems to be nothing.
+
+They are searched with a constant in each, as another zero makes it. Without, a zero that is far off leaves so little of
+such a spring that nothing in it promises anything.
 """
 
 from collections.abc import Collection, Mapping
@@ -10,7 +13,10 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import Effect
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.effects.spring_stiffening import SpringStiffening
 from sea_ident.robot import Robot
 
@@ -34,6 +40,15 @@ def impossible_springs(bench: Bench, fit: Fit) -> dict[str, float]:
 def without_cubic(bench: Bench, joints: Collection[str]) -> Bench:
     """The same recording and a model without the cubic terms of some springs."""
     return bench.modelling([e for e in bench.effects if not (_is_cubic(e) and e.joint in joints)])
+
+
+def with_constants(bench: Bench, joints: Collection[str]) -> Selection:
+    """A model with a constant in some springs, as if that had been found."""
+    start = settle(bench, bench.effects)
+    constants = [SpringOffset(joint) for joint in sorted(joints)]
+    fit = bench.fit((*start.fit.effects, *constants), None, tangents=False)
+    final = settle_again(bench, fit)
+    return Selection(start, settle_again(bench, final.fit), len(constants), (0.0,) * len(constants))
 
 
 def left_without_cubic(robot: Robot, stiffness: Mapping[str, float]) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.own_zeros import OwnZero, joints_with_own_zeros
 from sea_ident.discrepancy.untold import BesideFit, in_base, widened
 from sea_ident.effects import Anchor, Effect, Side, spring_effects
 from sea_ident.estimation import Model
@@ -44,14 +45,22 @@ def repaired_model(model: Model, processed: ProcessedRecording, fit: Fit) -> Mod
     law = set(spring_effects(model.robot))
     known = (*model.effects, *model.spring_effects)
     found = with_open_shapes(model.robot, fit, known)
+    unknown = joints_with_own_zeros(found)
+    found = tuple(effect for effect in found if not isinstance(effect, OwnZero))
     effects = tuple(effect for effect in found if effect.side is not Side.SPRING or effect not in law)
     try:
-        return identified_beside(model.robot, processed, effects, fit)
+        return identified_beside(model.robot, processed, effects, fit, sorted(unknown))
     except SeaIdentError as error:
         return str(error)
 
 
-def identified_beside(robot: Robot, processed: ProcessedRecording, effects: Sequence[Effect], fit: Fit) -> Model:
+def identified_beside(
+    robot: Robot,
+    processed: ProcessedRecording,
+    effects: Sequence[Effect],
+    fit: Fit,
+    unknown_zero: Sequence[str] = (),
+) -> Model:
     """A model identified with what the motor torques do not tell from the fit of a diagnosis.
 
     Args:
@@ -59,6 +68,7 @@ def identified_beside(robot: Robot, processed: ProcessedRecording, effects: Sequ
         processed: the recording.
         effects: as `identify` takes them.
         fit: to link and motor equations of the same recording, with the same parameters.
+        unknown_zero: joints whose encoders of theta and q have different, unknown zeros.
 
     Returns:
         The model.
@@ -71,7 +81,7 @@ def identified_beside(robot: Robot, processed: ProcessedRecording, effects: Sequ
         how = default_estimator(processed)
         # one stretch may be so long that its equations are never there at once
         beside = BesideFit(how, fit) if processed.periods > 1 else how
-        found, observations, _ = identify_observed(robot, processed, effects, beside)
+        found, observations, _ = identify_observed(robot, processed, effects, beside, unknown_zero)
         own = found if beside is how else widened(replace(found, estimator=how.name), observations, fit)
         return doubted_anew(with_what_it_misses(own, observations, fit), found)
 

@@ -225,8 +225,6 @@ def _diagnosed(
     if texts_of(processed.doubts, DoubtKind.POSITION):
         unsound = replace(diagnosis, verdict=Verdict.CANNOT_TELL, text=words.UNSOUND, warnings=processed.warnings)
         diagnosis = without_sizes(unsound)
-    for text in diagnosis.warnings:
-        python_warnings.warn(text, SeaIdentWarning, stacklevel=5)
     return diagnosis
 
 

@@ -16,6 +16,7 @@ from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects.base import titled
 from sea_ident.exceptions import DivergenceError, SeaIdentError
+from sea_ident.robot import Robot
 
 FEW_PERIODS = 10
 
@@ -133,6 +134,25 @@ def not_simulated(label: str, error: SeaIdentError) -> str:
             "(controller=). What was found does not rest on this simulation"
         )
     return f"no forward simulation of the model {label} the repair: {why}"
+
+
+def fitted_zeros(robot: Robot, zeros: Mapping[str, float], held_out: Mapping[str, float]) -> list[str]:
+    """With which zeros theta was read where the model does not know them.
+
+    Args:
+        robot: the robot.
+        zeros: those of the recording, by joint [rad] or [m].
+        held_out: those of the held-out recording.
+    """
+    found = []
+    for joint, zero in zeros.items():
+        unit = robot.joints[robot.index(joint)].position_unit
+        there = f", on the held-out data {held_out[joint]:.4g} {unit}" if joint in held_out else ""
+        found.append(
+            f"theta_{joint} was read less {zero:.4g} {unit}{there}: the model was identified without knowing its zero, "
+            "and every recording is read with its own. A constant torque in that spring would be taken for it"
+        )
+    return found
 
 
 def told_by_the_other_motion(joint: str) -> str:
