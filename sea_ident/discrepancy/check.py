@@ -43,12 +43,15 @@ class Findings:
         fatal: whether no conclusion can be drawn.
         doubtful: whether the positions may not be those of the model, so that a disagreement proves nothing.
         limited: whether what has no name may be what the sensors cannot show.
+        apart: whether zeros of encoders that differ explain springs that fit badly; what has no name beside them is no
+            effect.
     """
 
     warnings: tuple[str, ...] = ()
     fatal: bool = False
     doubtful: bool = False
     limited: bool = False
+    apart: bool = False
 
 
 def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float], still: Collection[str] = ()) -> Findings:

@@ -132,6 +132,9 @@ def conclude(
         verdict = Verdict.NOT_IN_LIBRARY
     if notes.limited and verdict is Verdict.NOT_IN_LIBRARY:
         verdict = Verdict.CANNOT_TELL
+    apart = notes.apart and verdict in (Verdict.NOT_IN_LIBRARY, Verdict.SUSPECT)
+    if apart:
+        verdict, lost, remainder = Verdict.CANNOT_TELL, True, 0.0
     beyond: dict[str, tuple[float, float]] = {}
     if verdict is Verdict.NONE and held is not None and held_gap is not None:
         beyond = beyond_the_motion(held, held_gap)
@@ -141,7 +144,7 @@ def conclude(
         verdict=verdict, missing=tuple(missing), gap=gap, held=held_gap, remainder=remainder,
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
-        kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted),
+        kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted or apart),
         standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)), beyond=beyond,
         still=still,
     )  # fmt: skip

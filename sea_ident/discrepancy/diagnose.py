@@ -1,7 +1,7 @@
 """`diagnose`: where a model and a recording disagree, and which effect is missing."""
 
 import warnings as python_warnings
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 from sea_ident.arguments import expect, expect_number
@@ -32,7 +32,8 @@ from sea_ident.discrepancy.own_zeros import own_zeros
 from sea_ident.discrepancy.possible_springs import (
     impossible_springs,
     left_without_cubic,
-    with_constants,
+    with_fitted_zeros,
+    with_zeros_apart,
     without_cubic,
 )
 from sea_ident.discrepancy.repaired import repair, with_repaired
@@ -49,9 +50,11 @@ from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
+from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.scales import doubts_of_springs
+from sea_ident.estimation.spring_zero import zeros_apart
 from sea_ident.estimation.torque_units import other_torque_units
-from sea_ident.estimation.unknown_zeros import with_its_zeros, with_zeros
+from sea_ident.estimation.unknown_zeros import unknown_zeros, with_its_zeros, with_zeros
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.one_thread import one_thread
 from sea_ident.processing import ProcessedRecording, filter_recording
@@ -164,6 +167,7 @@ def _diagnosed(
     notes = replace(notes, doubtful=bool(texts_of(processed.doubts, DoubtKind.POSITION)))
     changing = Changing.of(model, recording, data)
     bench = Bench(data, model_effects(model))
+    apart = zeros_apart(Observations(robot, model.effects, model.base, as_identified), unknown_zeros(model))
     tell("searching", 0.1)
     basic = completed(bench)
     if basic is not None:
@@ -171,7 +175,7 @@ def _diagnosed(
     elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful:
         found = _unsearched(bench, changing)
     else:
-        found = _searched_with_possible_springs(bench, changing, tell)
+        found = _searched_with_possible_springs(bench, changing, tell, {other.joint: other.zero for other in apart})
     bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
     alternatives: Alternatives = {}
@@ -193,12 +197,16 @@ def _diagnosed(
     before = (processed, selection.start.fit) if selection.added else None
     repaired = repair(model, after, before, held, recording, processed, controller)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held), *_on_centres(bench, selection))
-    of_springs = (*doubts_of_springs(robot, model.springs), *circular_springs(robot, recording))
+    of_springs = (
+        *doubts_of_springs(robot, model.springs),
+        *(other.text for other in apart),
+        *circular_springs(robot, recording),
+    )
     of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
     basic_notes = (*of_sensors, *of_springs, *(() if basic is None else basic.warnings))
     steady = changing.not_shown_by(trends)
     said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *steady, *held_notes, *change_notes, *repaired.notes)
-    notes = replace(notes, warnings=said, limited=limited)
+    notes = replace(notes, warnings=said, limited=limited, apart=bool(apart))
     tell("writing it down", 0.95)
     held = changing.followed(bench, selection.final.fit, trends, held)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
@@ -226,14 +234,24 @@ def _compared(bench: Bench, confirmed: Confirmed, changing: Changing, notes: tup
     return _Found(bench, confirmed, changing.compared(confirmed.bench, confirmed.final.fit), notes)
 
 
-def _searched_with_possible_springs(bench: Bench, changing: Changing, tell: Progress) -> _Found:
-    """Search, and once more without the cubic terms of springs that are impossible with what was found."""
-    found = _searched_beyond_steps(bench, changing, tell)
+def _searched_with_possible_springs(
+    bench: Bench, changing: Changing, tell: Progress, apart: Mapping[str, float]
+) -> _Found:
+    """Search, and once more without the cubic terms of springs that are impossible with what was found.
+
+    Args:
+        bench: the recording.
+        changing: what changes from period to period.
+        tell: progress.
+        apart: differences of zeros that explain the misfit of springs, by joint [rad] or [m].
+    """
+    begun = with_zeros_apart(bench, apart) if apart else None
+    found = _searched_beyond_steps(bench, changing, tell, begun)
     impossible = impossible_springs(bench, found.confirmed.final.fit)
     if not impossible:
         return found
     without = without_cubic(bench, impossible)
-    other = _searched_beyond_steps(without, changing, tell, with_constants(without, impossible))
+    other = _searched_beyond_steps(without, changing, tell, with_fitted_zeros(without, impossible))
     if any(other.confirmed.final.fit.parameters[f"{joint}.spring_stiffness"] < 0.0 for joint in impossible):
         return found
     return replace(other, notes=(*other.notes, *left_without_cubic(bench.robot, impossible)))

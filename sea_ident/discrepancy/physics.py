@@ -13,10 +13,10 @@ from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.presliding_friction import PreslidingFriction
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
-from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
@@ -116,7 +116,7 @@ def is_of_a_law(effect: Effect) -> TypeGuard[AsymmetricSpring | SpringStiffening
 
 def is_term(effect: Effect) -> bool:
     """Whether an effect is a term more in a law that the model has: of a spring, or of viscous friction."""
-    return is_of_a_law(effect) or isinstance(effect, NonlinearViscousFriction | SpringOffset)
+    return is_of_a_law(effect) or isinstance(effect, NonlinearViscousFriction)
 
 
 def brakes(bench: Bench, fit: Fit, position: int) -> bool:
@@ -200,6 +200,9 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
     position %= len(fit.effects)
     effect = fit.effects[position]
     columns, values = effect.columns(bench.robot), fit.values[_own(bench, fit, position)]
+    if isinstance(effect, MotorEncoderOffset):
+        # one that counts from where it was switched on is off by anything; what is left is a spring, or it is not
+        return fit.parameters.get(f"{effect.joint}.{SPRING_LAW[0]}", 0.0) > 0.0
     if not columns:
         return own_torque(bench, fit, position) < LARGEST_OF_A_SENSOR
     if not effect.plausible(values, fit.parameters) or not dissipates(bench, effect, values):
@@ -208,10 +211,7 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
         return False  # where it ends beside what came after it, too
     if not pushes_back(bench, fit, position) or not brakes(bench, fit, position) or not builds_up(fit, position):
         return False
-    # a zero that is far off is a constant of many times what the spring carries, as its stiffness times that
-    if isinstance(effect, SpringOffset) and fit.parameters.get(f"{effect.joint}.{SPRING_LAW[0]}", 0.0) > 0.0:
-        return True
-    if is_term(effect) and not isinstance(effect, SpringOffset):
+    if is_term(effect):
         return True  # terms of one law cancel in part, and what they come to is asked above
     total = np.sqrt(np.sum(np.abs(bench.column_spectra(effect, fit.effects) @ values) ** 2, axis=0))
     return not np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms)

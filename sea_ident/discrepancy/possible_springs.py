@@ -3,8 +3,8 @@
 Where the deflection stays on one side of zero and varies little, a negative stiffness and a huge cubic one bend to
 anything smooth: what the model lacks there, as another zero of an encoder, then seems to be nothing.
 
-They are searched with a constant in each, as another zero makes it. Without, a zero that is far off leaves so little of
-such a spring that nothing in it promises anything.
+They are searched with another zero of each motor encoder, and so are springs whose misfit goes with that. Without, a
+zero that is far off leaves so little of such a spring that nothing in it promises anything.
 """
 
 from collections.abc import Collection, Mapping
@@ -14,8 +14,9 @@ import numpy as np
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
+from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.effects.spring_stiffening import SpringStiffening
 from sea_ident.robot import Robot
@@ -42,13 +43,29 @@ def without_cubic(bench: Bench, joints: Collection[str]) -> Bench:
     return bench.modelling([e for e in bench.effects if not (_is_cubic(e) and e.joint in joints)])
 
 
-def with_constants(bench: Bench, joints: Collection[str]) -> Selection:
-    """A model with a constant in some springs, as if that had been found."""
+def with_fitted_zeros(bench: Bench, joints: Collection[str]) -> Selection:
+    """A model with other zeros of some motor encoders, as if found, by the constants in their springs."""
     start = settle(bench, bench.effects)
     constants = [SpringOffset(joint) for joint in sorted(joints)]
     fit = bench.fit((*start.fit.effects, *constants), None, tangents=False)
-    final = settle_again(bench, fit)
-    return Selection(start, settle_again(bench, final.fit), len(constants), (0.0,) * len(constants))
+    values = settle_again(bench, fit).fit.parameters
+    zeros = {j: -values[f"{j}.spring_offset"] / values[f"{j}.spring_stiffness"] for j in joints}
+    return with_zeros_apart(bench, zeros, start)
+
+
+def with_zeros_apart(bench: Bench, zeros: Mapping[str, float], start: Settled | None = None) -> Selection:
+    """A model with other zeros of some motor encoders, as if these had been found.
+
+    Args:
+        bench: the recording.
+        zeros: what theta shows where q is zero and the spring carries nothing, by joint [rad] or [m].
+        start: the model without, settled, where that was done already.
+    """
+    start = settle(bench, bench.effects) if start is None else start
+    added = [MotorEncoderOffset(joint, offset=zero) for joint, zero in sorted(zeros.items())]
+    fit = bench.fit((*start.fit.effects, *added), None, tangents=False)
+    final = settle_again(bench, settle_again(bench, fit).fit)
+    return Selection(start, final, len(added), (0.0,) * len(added))
 
 
 def left_without_cubic(robot: Robot, stiffness: Mapping[str, float]) -> tuple[str, ...]:

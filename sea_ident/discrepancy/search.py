@@ -33,6 +33,7 @@ from sea_ident.discrepancy.next_effect import (
     next_effect,
     visible_changes,
 )
+from sea_ident.discrepancy.one_zero import as_one_zero
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again, settled_in_form
@@ -167,6 +168,8 @@ def search(
             added.pop()
             now = before
             break
+    now, left = as_one_zero(bench, now, len(added))
+    added = [added[k] for k in left]
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
     now = settled_in_form(bench, now, len(now.fit.effects) - len(added), by_the_first_element)

@@ -1,6 +1,7 @@
 """Whether a spring fits badly because the encoders on its two sides have different zeros."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,9 +10,25 @@ from sea_ident.effects import corrected_motion
 from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.spring_result import SpringResult, Verdict
 from sea_ident.estimation.springs import fit_zero, spring_columns
+from sea_ident.motion import Motion
 
 TAKES = 0.3
 """Residual with zeros of their own, over that without, up to which they are the reason [-]."""
+
+
+@dataclass(frozen=True)
+class OtherZero:
+    """A spring whose misfit goes with a difference of the zeros of theta and q.
+
+    Attributes:
+        joint: its joint.
+        zero: the difference [rad] or [m].
+        text: what to tell a user.
+    """
+
+    joint: str
+    zero: float
+    text: str
 
 
 def other_zeros(observations: Observations, values: FloatArray, springs: Sequence[SpringResult]) -> list[str]:
@@ -27,27 +44,53 @@ def other_zeros(observations: Observations, values: FloatArray, springs: Sequenc
     """
     doubted = [s for s in springs if s.zero == 0.0 and s.verdict is not Verdict.CIRCULAR and not s.terms]
     doubted = [s for s in doubted if s.doubt() is not None or s.stiffness < 0.0]
+    return [zero.text for zero in _zeros_of(observations, values, [s.joint for s in doubted])]
+
+
+def zeros_apart(observations: Observations, known: Collection[str]) -> tuple[OtherZero, ...]:
+    """Springs of a recording whose misfit goes with a difference of the zeros of theta and q, whatever model there is.
+
+    Args:
+        observations: the recording.
+        known: joints of which the difference is known.
+    """
+    robot = observations.robot
+    names = [robot.joint_names[i] for i in robot.elastic_indices]
+    rows = observations.rows
+    values = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), observations.torque.ravel(), rcond=None)[0]
+    return tuple(_zeros_of(observations, values.astype(np.float64), [name for name in names if name not in known]))
+
+
+def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[str]) -> list[OtherZero]:
     # what follows from a wrong period or a column that is doubted is no fault of a zero
-    if not doubted or observations.processed.doubts:
+    if not joints or observations.processed.doubts:
         return []
     robot, processed = observations.robot, observations.processed
     torque = observations.spring_torque(observations.mean, processed.tau_motor, values)
     motion = corrected_motion(robot, observations.effects, processed.motion)
     found = []
-    for spring in doubted:
-        joint = robot.index(spring.joint)
+    for name in joints:
+        joint = robot.index(name)
         tau = torque[:, robot.elastic_indices.tolist().index(joint)]
         zero = fit_zero(motion, joint, tau)
-        columns = spring_columns(motion, joint, zero)
-        law = np.linalg.lstsq(columns, tau, rcond=None)[0]
-        left = float(np.sqrt(np.mean((tau - columns @ law) ** 2)))
-        if not (left < TAKES * spring.rms_residual and law[0] > 0.0):
+        (law, left), (without, whole) = (_law(motion, joint, tau, at) for at in (zero, 0.0))
+        # a spring that is none may fit as well
+        most = TAKES if without[0] > 0.0 else 1.0
+        if not (left < most * whole and law[0] > 0.0):
             continue
-        unit, name = robot.joints[joint].position_unit, spring.joint
-        found.append(
+        unit = robot.joints[joint].position_unit
+        text = (
             f"spring of {name}: zeros of theta_{name} and q_{name} that differ by {zero:.4g} {unit} would explain it: "
-            f"beside them its law leaves {left:.3g} instead of {spring.rms_residual:.3g}, and its stiffness is "
-            f"{law[0]:.4g}. Unless a constant torque acts there, have the difference fitted (unknown_zero, on the "
-            f"command line --unknown-zero {name}), or correct the zero of one encoder"
+            f"beside them its law leaves {left:.3g} instead of {whole:.3g}, and its stiffness is {law[0]:.4g}. Unless "
+            "a constant torque acts there, have the difference fitted (unknown_zero, on the command line "
+            f"--unknown-zero {name}), or correct the zero of one encoder"
         )
+        found.append(OtherZero(name, zero, text))
     return found
+
+
+def _law(motion: Motion, joint: int, tau: FloatArray, zero: float) -> tuple[FloatArray, float]:
+    """(3,) law of a spring about a zero, and the rms of what it leaves of a torque (N,)."""
+    columns = spring_columns(motion, joint, zero)
+    law = np.linalg.lstsq(columns, tau, rcond=None)[0].astype(np.float64)
+    return law, float(np.sqrt(np.mean((tau - columns @ law) ** 2)))

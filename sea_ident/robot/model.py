@@ -157,12 +157,12 @@ class Robot:
         Args:
             index: position of the joint in `joints`.
         """
-        before = self._before
+        before = self.parents
         first = () if before[index] < 0 else (before[index],)
         return (*first, *(k for k in range(self.n) if before[k] == index))
 
     @cached_property
-    def _before(self) -> tuple[int, ...]:
+    def parents(self) -> tuple[int, ...]:
         """(n,) position in `joints` of the joint before each one in the kinematic tree, -1 at the base."""
         names, parents = list(self.model.names), self.model.parents
         found = []

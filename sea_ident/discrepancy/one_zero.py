@@ -1,0 +1,84 @@
+"""Two wrong zeros of a joint that are one: those of its two encoders, and that of its angle.
+
+Both encoders are off where the angle is, so that each of the three is the sum of the two others. What turns the first
+joint turns gravity. A search adds one after the other, and may end with two where one is simpler.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations
+
+from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.judge import penalty
+from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects import Effect
+from sea_ident.effects.base_tilt import BaseTilt
+from sea_ident.effects.encoder_offset import EncoderOffset
+from sea_ident.effects.joint_offset import JointOffset
+from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
+from sea_ident.effects.spring_offset import SpringOffset
+
+OF_A_JOINT = (EncoderOffset, MotorEncoderOffset, JointOffset)
+"""Wrong zeros of a joint with a spring: of q, of theta, of both."""
+
+
+def as_one_zero(bench: Bench, now: Settled, added: int) -> tuple[Settled, list[int]]:
+    """A model with one wrong zero in the place of two that were added, where that does as well for its price.
+
+    Args:
+        bench: the recording.
+        now: the model.
+        added: number of effects added, its last ones.
+
+    Returns:
+        The model, and which of the effects that were added are left; the first of two stands for both.
+    """
+    left, found = list(range(added)), True
+    while found:
+        fit, found = now.fit, False
+        first = len(fit.effects) - len(left)
+        for one, two in combinations(range(first, len(fit.effects)), 2):
+            single = _single(bench, fit.effects[one], fit.effects[two], fit.parameters)
+            if single is None:
+                continue
+            others = [single if k == one else e for k, e in enumerate(fit.effects) if k != two]
+            new = bench.refine(others, now.noise, start=fit.parameters, only=len(bench.effects))
+            spared = sum(penalty(fit.effects[k], bench) for k in (one, two)) - penalty(new.effects[one], bench)
+            if new.statistic < fit.statistic + fit.unit * spared:
+                now, found = settle_again(bench, new), True
+                left.pop(two - first)
+                break
+    return now, left
+
+
+def _single(bench: Bench, one: Effect, two: Effect, parameters: Mapping[str, float]) -> Effect | None:
+    """The zero that two effects may be; None where they are none of one joint."""
+    robot = bench.robot
+    zeros = [effect for effect in (one, two) if isinstance(effect, (*OF_A_JOINT, SpringOffset))]
+    tilted = any(isinstance(effect, BaseTilt) for effect in (one, two))
+    joints = {effect.required_joint for effect in zeros}
+    if len(zeros) + tilted < 2 or len(joints) != 1:
+        return None
+    (joint,) = joints
+    i = robot.index(joint)
+    if not robot.joints[i].elastic:
+        return None
+    sizes = [_size(effect, parameters) for effect in zeros]
+    of_q = sum(s for s, e in zip(sizes, zeros, strict=True) if isinstance(e, EncoderOffset | JointOffset))
+    of_theta = sum(s for s, e in zip(sizes, zeros, strict=True) if not isinstance(e, EncoderOffset))
+    kinds = {MotorEncoderOffset if isinstance(e, SpringOffset) else type(e) for e in zeros}
+    if tilted:
+        # the angle is off by whatever takes the zero of the one encoder away, and leaves that of the other
+        if robot.parents[i] >= 0 or JointOffset in kinds:
+            return None
+        others = kinds == {EncoderOffset}
+        return MotorEncoderOffset(joint, offset=-of_q) if others else EncoderOffset(joint, offset=-of_theta)
+    if EncoderOffset in kinds:
+        return MotorEncoderOffset(joint, offset=of_theta) if JointOffset in kinds else JointOffset(joint, offset=of_q)
+    return EncoderOffset(joint, offset=of_q) if JointOffset in kinds else MotorEncoderOffset(joint, offset=of_theta)
+
+
+def _size(effect: EncoderOffset | MotorEncoderOffset | JointOffset | SpringOffset, known: Mapping[str, float]) -> float:
+    """By how much a zero is off [rad] or [m]."""
+    if isinstance(effect, SpringOffset):
+        return -known[effect.parameter_name()] / known[f"{effect.joint}.spring_stiffness"]
+    return effect.offset
