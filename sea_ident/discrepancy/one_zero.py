@@ -55,7 +55,7 @@ def _single(bench: Bench, one: Effect, two: Effect, parameters: Mapping[str, flo
     robot = bench.robot
     zeros = [effect for effect in (one, two) if isinstance(effect, (*OF_A_JOINT, SpringOffset))]
     tilted = any(isinstance(effect, BaseTilt) for effect in (one, two))
-    joints = {effect.required_joint for effect in zeros}
+    joints = {str(effect.joint) for effect in zeros}
     if len(zeros) + tilted < 2 or len(joints) != 1:
         return None
     (joint,) = joints

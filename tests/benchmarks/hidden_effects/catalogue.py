@@ -199,6 +199,15 @@ LIBRARY: tuple[Entry, ...] = (
     Entry("external_force", "library", _external),
 )
 
+ZEROS: tuple[Entry, ...] = (
+    Entry("encoder_offset", "library", lambda p: (p.sign() * 0.02, 0.3, {})),
+    # a constant stands for it in a linear spring
+    Entry("motor_encoder_offset", "library", lambda p: (p.sign() * 0.02, 2.0, {}), springs=True,
+        accepted=("spring_offset",)),
+    # that of the first joint is a tilt of the base
+    Entry("joint_offset", "library", lambda p: (p.sign() * 0.02, 0.5, {}), springs=True, accepted=("base_tilt",)),
+)
+
 OTHER_FORMS: tuple[Entry, ...] = (
     Entry("stribeck_friction", "stiction", lambda p: (
         0.4 * p.coulomb, 4.0 * p.coulomb, {"speed": p.between(0.015, 0.04), "exponent": 1.0}),
@@ -247,7 +256,7 @@ REFERENCE: tuple[Entry, ...] = (
 # fmt: on
 
 ENTRIES: Mapping[tuple[str, str], Entry] = {
-    (entry.effect, entry.form): entry for entry in (*LIBRARY, *OTHER_FORMS, *UNKNOWN, *REFERENCE)
+    (entry.effect, entry.form): entry for entry in (*ZEROS, *LIBRARY, *OTHER_FORMS, *UNKNOWN, *REFERENCE)
 }
 
 

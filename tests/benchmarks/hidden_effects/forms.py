@@ -96,9 +96,9 @@ def _nothing(*_: object) -> None:
 ELSEWHERE = {
     (name, "library")
     for name in (
-        "torque_constant", "encoder_offset", "encoder_eccentricity", "position_delay", "torque_delay", "payload",
-        "external_force", "base_tilt", "link_flexibility", "torque_constant_drift", "crosstalk", "changed_inertia",
-        "common_torque_constant",
+        "torque_constant", "encoder_offset", "motor_encoder_offset", "joint_offset", "encoder_eccentricity",
+        "position_delay", "torque_delay", "payload", "external_force", "base_tilt", "link_flexibility",
+        "torque_constant_drift", "crosstalk", "changed_inertia", "common_torque_constant",
     )
 }  # fmt: skip
 

@@ -16,7 +16,9 @@ from tests.benchmarks.hidden_effects.sensors import signals
 BANDWIDTH = 15.0
 AROUND_REVERSALS = 3
 TREND_EFFECTS = ("friction_drift", "temperature_friction", "torque_constant_drift", "stiffness_drift")
-SENSOR_EFFECTS = ("encoder_offset", "encoder_eccentricity", "position_delay")
+SENSOR_EFFECTS = (
+    "encoder_offset", "motor_encoder_offset", "joint_offset", "encoder_eccentricity", "position_delay",
+)  # fmt: skip
 ABSORBED_EFFECTS = ("payload", "common_torque_constant", "changed_inertia")
 
 

@@ -108,7 +108,7 @@ def planted_effects(
             other = robot.joint_names[int(s["other"])]
             effect = make_effect(p.effect, joint, other=other, smoothing=smoothing, ratio=c)  # type: ignore[arg-type]
             yield PlantedEffect(effect, effect.planted(robot, c))  # type: ignore[attr-defined]
-        case "encoder_offset":
+        case "encoder_offset" | "motor_encoder_offset" | "joint_offset":
             yield one(offset=c)
         case "encoder_eccentricity":
             yield one(sine=turn[0], cosine=turn[1])

@@ -16,8 +16,8 @@ from tests.benchmarks.hidden_effects.sizes import size_errors
 
 Name = tuple[str, str | None]
 
-EQUAL_AT_THE_LAST_JOINT = {"spring_offset": "encoder_offset", "encoder_offset": "spring_offset"}
-"""Two effects that give the same data at the last joint, so that no diagnosis could tell them apart."""
+EQUAL_AT_THE_LAST_JOINT = ("spring_offset", "encoder_offset", "motor_encoder_offset")
+"""Effects that give the same data at the last joint, so that no diagnosis could tell them apart."""
 
 CONFIDENT = ("named", "named_with_remainder")
 
@@ -72,7 +72,8 @@ class Score:
 
     def accepts(self, planted: Planted, name: Name) -> bool:
         """Whether a name is right: the effect's own, one that its form belongs to as well, or one of equal data."""
-        if name == (EQUAL_AT_THE_LAST_JOINT.get(planted.effect), planted.joint) and self._is_last(planted.joint):
+        equal = {planted.effect, name[0]} <= set(EQUAL_AT_THE_LAST_JOINT) and name[1] == planted.joint
+        if equal and self._is_last(planted.joint):
             return True
         joint_fits = planted.joint is None or name[1] in (planted.joint, None)
         entry = ENTRIES.get((planted.effect, planted.form))

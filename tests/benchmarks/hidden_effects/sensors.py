@@ -29,6 +29,11 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
         match p.effect:
             case "encoder_offset":
                 q[:, i] += p.size
+            case "motor_encoder_offset":
+                theta[:, i] += p.size
+            case "joint_offset":
+                q[:, i] += p.size
+                theta[:, i] += p.size
             case "encoder_eccentricity":
                 q[:, i] += p.size * np.sin(q[:, i] + p.shape["phase"])
             case "position_delay":
