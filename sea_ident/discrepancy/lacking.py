@@ -10,9 +10,6 @@ from sea_ident.effects.drift import TrendEffect
 ONLY_AGAINST_REFERENCE = ("payload",)
 """Effects that a fit of all parameters absorbs altogether."""
 
-STOOD_FOR = ("motor_encoder_offset",)
-"""Effects that another one stands for as long as they are small: a search begins with them where they are not."""
-
 
 def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Every effect of the library at every place that the model does not have yet, and that shows in the mean."""
@@ -20,7 +17,7 @@ def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, 
     present_columns = {column.name for column in bench.labels(effects)}
     found = []
     for name, kind in sorted(effect_classes().items()):
-        if name in (*ONLY_AGAINST_REFERENCE, *STOOD_FOR) or issubclass(kind, TrendEffect):
+        if name in ONLY_AGAINST_REFERENCE or issubclass(kind, TrendEffect):
             continue
         for place in kind.instances(bench.robot):
             effect = _absent(bench, place, effect_key(place) in present, present_columns)

@@ -50,6 +50,8 @@ NAMES = [
     "rotor_coupling",
     "transmission_coupling",
     "encoder_offset",
+    "motor_encoder_offset",
+    "joint_offset",
     "encoder_eccentricity",
     "position_delay",
     "torque_delay",
@@ -177,7 +179,17 @@ def test_the_torque_in_a_simulation_is_that_of_the_columns(leg):
     assert checked > 10
 
 
-@pytest.mark.parametrize("name", ["encoder_offset", "encoder_eccentricity", "position_delay", "torque_delay"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "encoder_offset",
+        "motor_encoder_offset",
+        "joint_offset",
+        "encoder_eccentricity",
+        "position_delay",
+        "torque_delay",
+    ],
+)
 def test_a_sensor_effect_changes_what_is_seen_and_can_be_taken_out(name, leg):
     motion = smooth_motion(leg)
     signals = {"q": motion.q, "theta": motion.theta, "tau_motor": motion.q, "tau_spring": motion.q}
@@ -194,6 +206,10 @@ def test_a_sensor_effect_changes_what_is_seen_and_can_be_taken_out(name, leg):
         shown = replace(motion, q=seen["q"], theta=seen["theta"])
         again = replace(effect, **something).corrected(leg, shown)
         np.testing.assert_allclose(again.q[20:-20], motion.q[20:-20], atol=2e-4)
+    if "theta" in changed:
+        shown = replace(motion, q=seen["q"], theta=seen["theta"])
+        again = replace(effect, **something).corrected(leg, shown)
+        np.testing.assert_allclose(again.theta, motion.theta, atol=1e-12)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-4, 0.2])

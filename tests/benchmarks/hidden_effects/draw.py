@@ -101,7 +101,7 @@ ROWS = {
         ),
         Row("few", "five periods, nothing or one effect", 16, LIBRARY, half=True, periods=5),
         Row("frictionless", "next to no friction, nothing or one effect", 17, LIBRARY, half=True, friction=1e-3),
-        Row("zeros", "zeros of encoders and joints, gap 0.5 to 20 % of torque", 18, ZEROS, gap=(0.005, 0.2)),
+        Row("zeros", "zeros of encoders and joints, gap 0.4 to 4 % of torque", 18, ZEROS, gap=(0.004, 0.04)),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }
