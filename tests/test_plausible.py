@@ -268,6 +268,34 @@ def test_counts_that_an_encoder_lost_show_in_the_deflection(leg, recording):
     assert f"a turn of the motor is {turn:.4g} rad" in said
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.0, False), (0.2, False), (0.8, True), (-1.5, True)])
+def test_a_zero_that_changes_for_good_shows_in_the_deflection(leg, recording, share, told):
+    """Of any size that no spring makes from one sample to the next and keeps."""
+    deflection = recording.columns["theta_knee"] - recording.columns["q_knee"]
+    values = recording.columns["theta_knee"].copy()
+    values[2345:] += share * np.ptp(deflection)
+    said = found(leg, recording, theta_knee=values)
+    assert len(said) == told
+    assert all("theta_knee - q_knee jumps by" in text and "after sample 2344" in text for text in said)
+    values[2700:] -= share * np.ptp(deflection)  # and back again, as under a push
+    assert found(leg, recording, theta_knee=values) == []
+
+
+@pytest.mark.parametrize("kind", ["q", "theta"])
+def test_columns_of_two_joints_that_are_exchanged_are_told_by_the_other_encoder(leg, recording, kind):
+    swapped = {f"{kind}_hip": recording.columns[f"{kind}_knee"], f"{kind}_knee": recording.columns[f"{kind}_hip"]}
+    changed = recording.replace_columns(swapped)
+    (doubt,) = doubts(changed, leg, *(changed.channel(k, leg.joint_names) for k in ("q", "theta", "tau_motor")))
+    assert doubt.kind is DoubtKind.POSITION
+    assert "theta_hip moves as q_knee, and theta_knee as q_hip: columns q of 'hip' and 'knee' look" in doubt.text
+    assert "--column 'q_hip=q_knee' --column 'q_knee=q_hip', or the same with theta" in doubt.text
+
+
+def test_joints_that_move_alike_are_not_exchanged(leg, recording):
+    alike = {f"{kind}_hip": recording.columns[f"{kind}_knee"] for kind in ("q", "theta")}
+    assert not [text for text in found(leg, recording, **alike) if "exchanged" in text]
+
+
 def test_spikes_of_a_torque_are_counted_and_noise_is_none(leg, recording):
     def said(torque):
         changed = recording.replace_columns({"tau_motor_knee": torque})

@@ -1,5 +1,7 @@
 """What no robot does, but a wrong unit, a wrong column or a broken encoder: said before anything is identified."""
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,9 @@ STRONGER = 3.0
 
 ALIKE = 0.3
 """Largest deviation of the slope of theta over q from 1 without a word; a soft spring gives a tenth."""
+
+TOGETHER = 0.95
+"""Correlation from which on a motor and a link are those of one joint [-]."""
 
 RECOGNISED = 0.15
 """Deviation from a factor up to which it is recognised."""
@@ -59,6 +64,13 @@ FEWEST_CHANGES = 50
 REGULAR = 0.9
 """Share of changes equally far apart from which on a signal was held between samples; an encoder's depend on speed."""
 
+LASTING = 0.05
+"""Share of a recording before and after a step of a deflection from which on it may be a lasting one [-], ..."""
+
+STAYS = 0.5
+"""... and share of the step that its levels may differ by from it, and that the deflection must move less than twice
+as far as [-]."""
+
 FASTER = 6.0
 """Speed over that of the faster tenth of the samples from which on a step is a jump."""
 
@@ -81,6 +93,9 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
     def doubt(kind: DoubtKind, texts: list[str]) -> None:
         found.extend(Doubt(kind, f"{recording.source}: {text}") for text in texts)
 
+    exchanged = _exchanged(robot, q, theta)
+    doubt(DoubtKind.POSITION, [_say_exchanged(*pair) for pair in exchanged])
+    others = {name for pair in exchanged for name in pair}
     for i, joint in enumerate(robot.joints):
         doubt(DoubtKind.POSITION, _position(joint, robot.limits.lower[i], robot.limits.upper[i], q[:, i]))
         if not np.isfinite(robot.limits.upper[i] - robot.limits.lower[i]):
@@ -88,7 +103,8 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
         doubt(DoubtKind.TORQUE, _torque(recording, joint, robot.limits.torque[i], torque[:, i]))
         sensors = [(f"q_{joint.name}", q[:, i])]
         if joint.elastic:
-            doubt(*_slope(joint, q[:, i], theta[:, i]))
+            if joint.name not in others:
+                doubt(*_slope(joint, q[:, i], theta[:, i]))
             if recording.has("tau_spring", joint.name):
                 measured = recording.channel("tau_spring", [joint.name])[:, 0]
                 doubt(DoubtKind.TORQUE, _sensor(joint, measured, theta[:, i] - q[:, i]))
@@ -104,6 +120,32 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
             doubt(DoubtKind.SENSOR, _held(recording.time, name, values))
     doubt(DoubtKind.POSITION, _not_held(recording, robot))
     return found
+
+
+def _exchanged(robot: Robot, q: FloatArray, theta: FloatArray) -> list[tuple[str, str]]:
+    """Pairs of joints of which each motor moves as the link of the other, and not as its own."""
+    elastic = [i for i in robot.elastic_indices if np.ptp(q[:, i]) > 0.0 and np.ptp(theta[:, i]) > 0.0]
+    return [
+        (robot.joint_names[i], robot.joint_names[j])
+        for i, j in combinations(elastic, 2)
+        if all(_goes_with(q[:, a], theta[:, b]) for a, b in ((i, j), (j, i)))
+        and not any(_goes_with(q[:, k], theta[:, k]) for k in (i, j))
+    ]
+
+
+def _goes_with(q: FloatArray, theta: FloatArray) -> bool:
+    """Whether a motor moves as far as a link, at the same time."""
+    slope = float(np.cov(q, theta)[0, 1] / np.var(q, ddof=1))
+    return abs(slope - 1.0) <= ALIKE and bool(np.corrcoef(q, theta)[0, 1] > TOGETHER)
+
+
+def _say_exchanged(one: str, other: str) -> str:
+    names = " ".join(f"--column 'q_{a}=q_{b}'" for a, b in ((one, other), (other, one)))
+    return (
+        f"theta_{one} moves as q_{other}, and theta_{other} as q_{one}: columns q of {one!r} and {other!r} look "
+        f"exchanged, or those of theta. Name them the other way (ColumnSource, on the command line {names}, or the "
+        "same with theta)"
+    )
 
 
 def _not_held(recording: Recording, robot: Robot) -> list[str]:
@@ -312,19 +354,36 @@ def _jumps(time: FloatArray, values: FloatArray) -> NDArray[np.intp]:
 
 
 def _slip(time: FloatArray, joint: Joint, deflection: FloatArray) -> list[str]:
-    """Whether a deflection makes a step of whole turns of the motor, too small to be seen in the positions.
+    """Whether a deflection makes a step of whole turns of the motor, or one that stays, too small for the positions.
 
-    A step of another size may be a push, or play that is crossed.
+    Several steps of another size may be pushes, or play that is crossed.
     """
-    if joint.actuator is None or joint.prismatic:
+    if joint.actuator is None:
         return []
-    turn = 2.0 * np.pi / abs(joint.actuator.gear_ratio)
     jumps = _jumps(time, deflection)
-    turns = np.abs(np.diff(deflection)[jumps]) / turn
-    if not 0 < jumps.size <= MOST_SLIPS or np.any((turns < 0.5) | (np.abs(turns - np.round(turns)) > TURN_WITHIN)):
+    if not jumps.size:
         return []
-    (told,) = _jump(time, f"theta_{joint.name} - q_{joint.name}", deflection, joint)
-    return [f"{told} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
+    told = _jump(time, f"theta_{joint.name} - q_{joint.name}", deflection, joint)
+    turn = np.inf if joint.prismatic else 2.0 * np.pi / abs(joint.actuator.gear_ratio)
+    turns = np.abs(np.diff(deflection)[jumps]) / turn
+    whole = (turns >= 0.5) & (np.abs(turns - np.round(turns)) <= TURN_WITHIN)
+    if jumps.size <= MOST_SLIPS and np.all(whole):
+        return [f"{told[0]} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
+    return told if jumps.size == 1 and _stays(deflection, int(jumps[0])) else []
+
+
+def _stays(deflection: FloatArray, k: int) -> bool:
+    """Whether what changes after a sample changes for good, by more than anything does before or after it.
+
+    A spring that is deflected as far, or play, comes back within a period.
+    """
+    before, after = deflection[: k + 1], deflection[k + 1 :]
+    if min(len(before), len(after)) < LASTING * len(deflection):
+        return False
+    level = float(np.median(after) - np.median(before))
+    step = float(after[0] - before[-1])
+    widest = float(max(np.ptp(before), np.ptp(after)))
+    return abs(level - step) < STAYS * abs(step) and abs(step) > STAYS * widest
 
 
 def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
