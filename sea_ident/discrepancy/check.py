@@ -27,6 +27,9 @@ from sea_ident.robot import Robot
 CLIPPED_RUN = 4
 """Equal extreme samples in a row, in every period, that count as clipped."""
 
+PILED_UP = 5.0
+"""Samples at the largest value over those at the value next to it from which on it is a limit [-]."""
+
 CLIPPED_SHARE = 0.05
 """Share of clipped samples beyond which nothing can be told."""
 
@@ -294,11 +297,22 @@ def _clipped(torque: FloatArray) -> NDArray[np.bool_]:
             continue
         for extreme in (tau.max(), tau.min()):
             at = np.isclose(tau, extreme, rtol=1e-9, atol=0.0)
+            if np.count_nonzero(at) < PILED_UP * np.count_nonzero(_next_to(tau, extreme, at)):
+                continue  # a coarse sensor is at its largest step about as long as at the one before
             often = at.mean(axis=0) > 0.5
             for run in np.split(np.arange(len(often)), np.flatnonzero(np.diff(often.astype(int))) + 1):
                 if often[run[0]] and len(run) >= CLIPPED_RUN:
                     out[run, i] = True
     return out
+
+
+def _next_to(tau: FloatArray, extreme: float, at: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples (P, N) at the value next to an extreme one."""
+    others = tau[~at]
+    if not others.size:
+        return ~at
+    nearest = float(others[np.argmin(np.abs(others - extreme))])
+    return np.asarray(np.isclose(tau, nearest, rtol=1e-9, atol=0.0))
 
 
 def _clipped_positions(data: PeriodData, recording: Recording) -> list[str]:

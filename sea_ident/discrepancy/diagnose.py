@@ -202,7 +202,7 @@ def _diagnosed(
         *(other.text for other in apart),
         *circular_springs(robot, recording),
     )
-    of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps)
+    of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps, confirmed.final)
     basic_notes = (*of_sensors, *of_springs, *(() if basic is None else basic.warnings))
     steady = changing.not_shown_by(trends)
     said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *steady, *held_notes, *change_notes, *repaired.notes)

@@ -174,19 +174,23 @@ def encoder_steps(
     """
     if len(link_stack) < 2:
         return None
-    parts = []
-    for values, stack in ((link, link_stack), (motor, motor_stack)):
-        steps = np.array([step_of(column) for column in values.T])
-        parts.append((steps, _repeated(stack, steps) if np.any(steps > 0.0) else np.zeros_like(steps)))
-    (links, link_errors), (motors, motor_errors) = parts
+    links, motors = (np.array([step_of(column) for column in values.T]) for values in (link, motor))
+    link_errors, motor_errors = repeated_errors(link_stack, links), repeated_errors(motor_stack, motors)
     rigid = np.setdiff1d(np.arange(link.shape[1]), elastic)
     motors[rigid], motor_errors[rigid] = 0.0, 0.0
     found = EncoderSteps(links, motors, link_errors, motor_errors, elastic)
     return found if found.repeat else None
 
 
-def _repeated(stack: FloatArray, steps: FloatArray) -> FloatArray:
-    """(n,) standard deviation of what repeats, from the scatter between the periods (P, N, n); 0 where it is little."""
+def repeated_errors(stack: FloatArray, steps: FloatArray) -> FloatArray:
+    """(n,) standard deviation of what repeats, from the scatter between the periods (P, N, n); 0 where it is little.
+
+    Args:
+        stack: signals in two periods or more.
+        steps: (n,) of which they are whole multiples; 0 where there are none.
+    """
+    if not np.any(steps > 0.0):
+        return np.zeros_like(steps)
     periods, samples, _ = stack.shape
     # about half the recording apart, periods differ by all that drifts, and by an odd number by what comes in turn; the
     # median leaves out one that stands alone

@@ -13,7 +13,15 @@ from sea_ident.discrepancy.closing import SIGNALS
 from sea_ident.discrepancy.data import EquationKind, around_reversals, wide_processing
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.noise import REPEATED_VARIANCE, noise_from_steps, step_freedom
-from sea_ident.discrepancy.sensor_limits import HARDLY, MOST, WORTH_A_WORD, hardly_deflected, limits, steps_cover
+from sea_ident.discrepancy.sensor_limits import (
+    HARDLY,
+    MOST,
+    WORTH_A_WORD,
+    hardly_deflected,
+    limits,
+    steps_cover,
+    torque_steps,
+)
 from sea_ident.discrepancy.settle import CONSISTENT, settle
 from sea_ident.reversals import UNCERTAIN_SIGN
 from sea_ident.simulation import SensorNoise
@@ -139,7 +147,7 @@ def test_a_spring_that_hardly_moves_is_told(laboratory, nothing_missing):
     bench, start = nothing_missing
     data = bench.data
     assert hardly_deflected(data) == ()
-    assert limits(bench, start, None) == ((), False)
+    assert limits(bench, start, None, start) == ((), False)
     knee = bench.robot.index("knee")
     deflection = data.motion.deflection[:, knee] - data.motion.deflection[:, knee].mean()
     scatter = np.std([motion.deflection[:, knee] for motion in data.period_motions], axis=0, ddof=1)
@@ -153,5 +161,50 @@ def test_a_spring_that_hardly_moves_is_told(laboratory, nothing_missing):
         assert len(texts) == told
         assert all("spring of knee" in text and f"{times * HARDLY:.2g} times the noise" in text for text in texts)
     assert limits(
-        bench.__class__(replace(still, motion=replace(data.motion, theta=data.motion.q)), bench.effects), start, None
+        bench.__class__(replace(still, motion=replace(data.motion, theta=data.motion.q)), bench.effects),
+        start,
+        None,
+        start,
     )[1]
+
+
+def rounded(robot, recording, step):
+    """A recording whose currents are read in steps of so much torque."""
+    motors = {f"current_{joint.name}": joint.actuator for joint in robot.joints}
+    steps = {name: step / (motor.gear_ratio * motor.torque_constant) for name, motor in motors.items()}
+    columns = recording.columns
+    return recording.replace_columns({name: own * np.round(columns[name] / own) for name, own in steps.items()})
+
+
+@pytest.mark.scenario
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+@pytest.mark.parametrize(("step", "repeats"), [(0.05, False), (0.5, True), (1.5, True)])
+def test_steps_of_a_torque_that_repeat_are_told_and_are_no_effect(laboratory, step, repeats):
+    """They were a clipped torque, or something that is not in the library."""
+    quiet = SensorNoise(current=0.0, motor_torque=0.05)
+    recording = rounded(laboratory.leg, laboratory.record(periods=10, sensors=quiet), step)
+    found = diagnose(identify(laboratory.leg, recording, period=PERIOD), recording)
+    said = [text for text in found.warnings if "is read in steps that do not average out" in text]
+    assert len(said) == repeats
+    # a gear that the motor drives takes its share
+    told = [f"{joint.name} {step * joint.actuator.efficiency:.3g} N m (" for joint in laboratory.leg.joints]
+    assert all(any(part in text for part in told) for text in said)
+    assert not any("clipped" in text for text in found.warnings)
+    assert found.missing == ()
+    assert found.verdict in ((Verdict.NONE, Verdict.CANNOT_TELL) if repeats else (Verdict.NONE,))
+
+
+@pytest.mark.scenario
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_an_effect_beyond_the_steps_of_a_torque_keeps_its_name(laboratory):
+    planted, quiet = [("stribeck_friction", "knee", [2.0], {"speed": 0.1})], SensorNoise(current=0.0, motor_torque=0.05)
+    seen = [
+        rounded(laboratory.leg, laboratory.record(planted, periods=10, motion=m, sensors=quiet), 0.3) for m in (0, 1)
+    ]
+    found = diagnose(identify(laboratory.leg, seen[0], period=PERIOD), seen[0], holdout=seen[1])
+    assert [(m.effect, m.joint) for m in found.missing] == [("stribeck_friction", "knee")]
+
+
+def test_no_steps_are_told_of_a_torque_that_has_none(nothing_missing):
+    bench, start = nothing_missing
+    assert torque_steps(bench, start) == ((), False)
