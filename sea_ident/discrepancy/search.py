@@ -26,6 +26,7 @@ from sea_ident.discrepancy.judge import (
 )
 from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
+from sea_ident.discrepancy.lags import with_their_lags
 from sea_ident.discrepancy.next_effect import (
     BESIDE_ANOTHER,
     FAMILY_LEVEL,
@@ -219,11 +220,11 @@ def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: C
 
 
 def _formed(bench: Bench, now: Settled) -> Settled:
-    """Pushes with their edges and springs with their kinks where they belong, saturation by the power that it needs."""
+    """Pushes with their edges and springs with their kinks where they belong, saturation and delays as they need."""
     first = len(bench.effects)
     sharp = sharpened(bench, now.fit, now.noise, first)
     now = settled_in_form(bench, now if sharp is now.fit else settle_again(bench, sharp), first, at_its_kink)
-    return with_their_powers(bench, now, first)
+    return with_their_lags(bench, with_their_powers(bench, now, first), first)
 
 
 def _settled(bench: Bench, now: Settled) -> Settled:
