@@ -117,6 +117,7 @@ class _Task:
     source: str
     annotation: str | None
     joints: tuple[str, ...]
+    gravity: tuple[float, ...]
     period: float | None
     columns: Mapping[str, str | ColumnSource] | None
     parent: int
@@ -130,7 +131,7 @@ class _Task:
                 while block := file.read(1 << 20):
                     digest.update(block)
         columns = {name: asdict(as_source(how)) for name, how in sorted((self.columns or {}).items())}
-        settings = [self.urdf, self.annotation, self.joints, self.period, columns, sea_ident.__version__]
+        settings = [self.urdf, self.annotation, self.joints, self.gravity, self.period, columns, sea_ident.__version__]
         digest.update(json.dumps(settings).encode())
         return digest.hexdigest()
 
@@ -188,7 +189,17 @@ def identify_batch(
     except OSError as error:
         raise RecordingError(f"{target}: cannot be made: {error.strerror or error}") from None
     tasks = [
-        _Task(str(path), robot.urdf, robot.source, robot.annotation, robot.joint_names, period, columns, os.getpid())
+        _Task(
+            str(path),
+            robot.urdf,
+            robot.source,
+            robot.annotation,
+            robot.joint_names,
+            tuple(robot.gravity.tolist()),
+            period,
+            columns,
+            os.getpid(),
+        )
         for path in paths
     ]
     tell = progress or (lambda done, count, name: None)
@@ -264,7 +275,7 @@ def _one(task: _Task) -> _Outcome:
         # a worker of its own: what is warned of is in the outcome, and its standard error is nobody's
         warnings.simplefilter("ignore", SeaIdentWarning)
     try:
-        robot = robot_from_text(task.urdf, task.source, task.annotation, task.joints)
+        robot = robot_from_text(task.urdf, task.source, task.annotation, task.joints, task.gravity)
         recording = read_recording(task.path, columns=task.columns)
         model = identify(robot, recording, period=task.period)
         found = tuple(dict.fromkeys((*recording.warnings, *model.warnings)))

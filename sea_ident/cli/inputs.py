@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sea_ident.exceptions import RecordingError
+from sea_ident.exceptions import RecordingError, RobotError
 
 if TYPE_CHECKING:
     from sea_ident.discrepancy import Diagnosis
@@ -16,11 +16,23 @@ if TYPE_CHECKING:
     from sea_ident.robot import HalfSpace, Limits, Robot
 
 
-def read_robot(source: str, annotation: str | None, joints: str | None) -> "Robot":
-    """The robot that the ROBOT argument and its two options mean."""
+def read_robot(source: str, annotation: str | None, joints: str | None, gravity: str | None) -> "Robot":
+    """The robot that the ROBOT argument and its options mean.
+
+    Raises:
+        RobotError: gravity is not three numbers.
+    """
     from sea_ident.robot import load_robot
 
-    return load_robot(source, annotation, None if joints is None else split_names(joints))
+    names = None if joints is None else split_names(joints)
+    return load_robot(source, annotation, names, None if gravity is None else _gravity(gravity))
+
+
+def _gravity(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise RobotError(f"--gravity {text}: give three numbers [m/s2], as --gravity 0,0,-9.81") from None
 
 
 def read_limits(robot: "Robot", half_spaces: Sequence[str] | None, self_collision: float | None) -> "Limits":

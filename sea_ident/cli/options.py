@@ -21,6 +21,15 @@ JointNames: TypeAlias = Annotated[
     str | None,
     typer.Option("--joints", metavar="a,b,c", help="Joints that move; all others are locked. Default: all."),
 ]
+Gravity: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--gravity",
+        metavar="X,Y,Z",
+        help="Gravity in the root link of the URDF, where the robot hangs or is mounted on a wall [m/s2]. "
+        "Default: 0,0,-9.81.",
+    ),
+]
 AsJson: TypeAlias = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")
 ]

@@ -199,7 +199,7 @@ class BaseTilt(Effect):
             robot = robot.with_inertial_parameters(robot.inertial_parameters + more, robot.rotor_inertias())
         gravity = np.asarray(robot.model.gravity.linear)
         turn = sum((value * axis for value, axis in zip(values, level_axes(gravity), strict=True)), np.zeros(3))
-        return with_gravity(robot, pin.exp3(-turn) @ gravity)
+        return robot.with_gravity(pin.exp3(-turn) @ gravity)
 
     def _felt(self, state: State) -> FloatArray:
         """(N, n, 2) torque of the change of gravity over each angle."""
@@ -230,11 +230,3 @@ def _apart(columns: FloatArray) -> bool:
     """Whether none of the columns (M, k) is nearly a sum of the others."""
     sizes = np.linalg.norm(columns, axis=0)
     return bool(np.all(sizes > 0.0)) and float(np.linalg.svd(columns / sizes, compute_uv=False)[-1]) > APART
-
-
-def with_gravity(robot: Robot, gravity: FloatArray) -> Robot:
-    """The same robot under another gravity (3,) [m/s2]."""
-    model, extended = pin.Model(robot.model), pin.Model(robot.extended_model)
-    model.gravity = pin.Motion(np.asarray(gravity), np.zeros(3))
-    extended.gravity = pin.Motion(np.asarray(gravity), np.zeros(3))
-    return replace(robot, model=model, extended_model=extended)

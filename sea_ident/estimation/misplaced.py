@@ -1,14 +1,14 @@
-"""Columns that are those of another joint or have the wrong sense: told by how much better the model fits without."""
+"""Columns of another joint or of the wrong sense, or a robot that is mounted another way: told by a better fit."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, State
 from sea_ident.motion import Motion
 from sea_ident.processing import ProcessedRecording
 from sea_ident.processing.torque import transmitted
@@ -23,6 +23,12 @@ LARGE = 0.01
 
 BETTER = 0.1
 """What is left with the columns put right, over what was left, up to which they were wrong [-]."""
+
+ALIKE = 2.0
+"""Times what is left at best up to which directions of gravity are alike [-]."""
+
+NEARLY = 0.1
+"""Share by which directions of gravity differ at least to be others [-]."""
 
 EXPLAINED = 0.03
 """Share of the power of the torque that may be left then: a model of a real robot lacks something, too [-]."""
@@ -39,6 +45,7 @@ class _Order:
         motion_sign: (n,) 1 or -1.
         torque_sign: (n,) 1 or -1.
         text: what is wrong if this is right, and what to do.
+        gravity: (3,) in the root link [m/s2]; that of the description where None.
     """
 
     link: NDArray[np.int_]
@@ -47,10 +54,11 @@ class _Order:
     motion_sign: FloatArray
     torque_sign: FloatArray
     text: str
+    gravity: FloatArray | None = None
 
 
 def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: ProcessedRecording) -> str | None:
-    """What is wrong with the columns of a recording that the model fits only after two joints change places.
+    """What is wrong with a recording that the model fits only after two joints change places, or gravity another way.
 
     Nothing is looked for where the model leaves little of the torque. What a model lacks does not look like this: with
     the columns put right a tenth of what was left must be left, and every joint must have a positive inertia.
@@ -63,8 +71,6 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     Returns:
         A sentence; None where the columns may be as they say.
     """
-    if robot.n < 2:
-        return None
     thin = slice(None, None, max(1, processed.samples * robot.n // EQUATIONS))
     motion, torque = processed.motion[thin], processed.tau_motor[thin]
     channels = {kind: values[thin] for kind, values in processed.channels.items()}
@@ -81,7 +87,8 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
         target = torque[:, order.torque] * order.torque_sign
         if current is not None and by_current:
             target = _from_current(robot, current[:, order.torque] * order.torque_sign, arranged)
-        rows = build_total(robot, effects, arranged, channels)
+        mounted = robot if order.gravity is None else robot.with_gravity(order.gravity)
+        rows = build_total(mounted, effects, arranged, channels)
         scale = 1.0 / np.sqrt(np.mean(target**2, axis=0))
         table = (rows * scale[:, None]).reshape(-1, rows.shape[-1])
         norms = np.linalg.norm(table, axis=0)
@@ -89,7 +96,7 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
         values = np.linalg.lstsq(table / norms, (target * scale).ravel(), rcond=1e-8)[0]
         residual = target * scale - (table / norms @ values).reshape(target.shape)
         left = np.maximum(np.mean(residual**2, axis=0) - noise[order.torque], 0.0)
-        response = build_total(robot, effects, _pushes(robot, arranged.q.mean(axis=0)))
+        response = build_total(mounted, effects, _pushes(robot, arranged.q.mean(axis=0)))
         inertia = np.array([(response[i, i] - response[-1, i]) / norms @ values for i in range(robot.n)])
         return float(np.mean(left)), bool(np.all(inertia > 0.0))
 
@@ -98,17 +105,29 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     before, _ = tried(_Order(own, own, own, plain, plain, ""))
     if before < LARGE:
         return None
-    found = [(*tried(order), order) for order in _orders(robot, "current" if by_current else "tau_motor")]
+    orders = (*_orders(robot, "current" if by_current else "tau_motor"), *_mountings(robot))
+    found = [(*tried(order), order) for order in orders]
     possible = [(left, order) for left, positive, order in found if positive]
     if not possible:
         return None
     after, order = min(possible, key=lambda pair: pair[0])
+    if order.gravity is not None:
+        # bodies of any sign feel gravity from either side: those of the description tell
+        alike = [pair for pair in possible if pair[1].gravity is not None and pair[0] <= ALIKE * after]
+        after, order = max(alike, key=lambda pair: _as_described(robot, motion, torque, pair[1].gravity))
     if not (after < BETTER * before and after < EXPLAINED):
         return None
     return (
         f"{processed.source}: {order.text}. With that the model leaves {100.0 * after**0.5:.2g} % of the torque beyond "
         f"its noise, without it {100.0 * before**0.5:.2g} %"
     )
+
+
+def _as_described(robot: Robot, motion: Motion, torque: FloatArray, gravity: FloatArray | None) -> float:
+    """How well the weight of the bodies as they are described goes with a torque (N, n) [-]."""
+    acts = robot.gravity if gravity is None else gravity
+    weight = State(robot, motion).gravity_torque(acts, robot.inertial_parameters)
+    return float(np.sum(weight * torque) / max(float(np.linalg.norm(weight) * np.linalg.norm(torque)), 1e-300))
 
 
 def _orders(robot: Robot, torque: str) -> Iterator[_Order]:
@@ -134,6 +153,24 @@ def _orders(robot: Robot, torque: str) -> Iterator[_Order]:
         yield _Order(own, own, own, plain, turned, _reversed((torque,), name))
         yield _Order(own, own, own, turned, plain, _reversed(positions, name))
         yield _Order(own, own, own, turned, turned, _reversed((*positions, torque), name))
+
+
+def _mountings(robot: Robot) -> Iterator[_Order]:
+    """Gravity along the edges, the diagonals of the sides and those of the whole of a cube around the root link."""
+    own, plain = np.arange(robot.n), np.ones(robot.n)
+    size = float(np.linalg.norm(robot.gravity))
+    for way in product((0.0, -1.0, 1.0), repeat=3):
+        if not size or not any(way):
+            continue
+        gravity = size * np.array(way) / np.linalg.norm(way)
+        if np.linalg.norm(gravity - robot.gravity) < NEARLY * size:
+            continue
+        now, then = (", ".join(f"{value + 0.0:.3g}" for value in each) for each in (robot.gravity, gravity))
+        text = (
+            f"gravity looks like ({then}) m/s2 in the root link, not ({now}): does the robot hang, or is it on a "
+            f"wall? Load it with gravity=({then}), on the command line --gravity={then.replace(' ', '')}"
+        )
+        yield _Order(own, own, own, plain, plain, text, gravity)
 
 
 def _exchanged(what: str, kinds: tuple[str, ...], a: str, b: str) -> str:

@@ -111,6 +111,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "urdf": robot.urdf,
             "annotation": robot.annotation,
             "joints": list(names),
+            "gravity": robot.gravity.tolist(),
         },
         "update": None if model.update is None else model.update.to_dict(),
         "notes": list(model.notes),
@@ -186,7 +187,11 @@ def model_from_dict(record: Mapping[str, Any]) -> Model:
     """
     description = record["description"]
     robot = robot_from_text(
-        description["urdf"], description["source"], description["annotation"], description["joints"]
+        description["urdf"],
+        description["source"],
+        description["annotation"],
+        description["joints"],
+        description.get("gravity"),
     )
     if list(robot.joint_names) != record["joints"]:
         raise ModelFileError(f"joints are {record['joints']}, but the description has {list(robot.joint_names)}")

@@ -16,6 +16,10 @@ TAKES = 0.3
 """Residual with zeros of their own, over that without, up to which they are the reason [-]."""
 
 
+EXPLAINS = 0.3
+"""Share of the change of the torque of a spring that its law may leave then [-]."""
+
+
 @dataclass(frozen=True)
 class OtherZero:
     """A spring whose misfit goes with a difference of the zeros of theta and q.
@@ -55,10 +59,12 @@ def zeros_apart(observations: Observations, known: Collection[str]) -> tuple[Oth
         known: joints of which the difference is known.
     """
     robot = observations.robot
-    names = [robot.joint_names[i] for i in robot.elastic_indices]
+    names = [name for name in (robot.joint_names[i] for i in robot.elastic_indices) if name not in known]
+    if not names:
+        return ()
     rows = observations.rows
     values = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), observations.torque.ravel(), rcond=None)[0]
-    return tuple(_zeros_of(observations, values.astype(np.float64), [name for name in names if name not in known]))
+    return tuple(_zeros_of(observations, values.astype(np.float64), names))
 
 
 def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[str]) -> list[OtherZero]:
@@ -76,7 +82,7 @@ def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[s
         (law, left), (without, whole) = (_law(motion, joint, tau, at) for at in (zero, 0.0))
         # a spring that is none may fit as well
         most = TAKES if without[0] > 0.0 else 1.0
-        if not (left < most * whole and law[0] > 0.0):
+        if not (left < min(most * whole, EXPLAINS * float(np.std(tau))) and law[0] > 0.0):
             continue
         unit = robot.joints[joint].position_unit
         text = (

@@ -26,6 +26,7 @@ def load_robot(
     source: str | Path,
     annotation: str | Path | None = None,
     joints: Sequence[str] | None = None,
+    gravity: Sequence[float] | None = None,
 ) -> Robot:
     """Load a robot from a URDF.
 
@@ -34,6 +35,8 @@ def load_robot(
         annotation: path (or shipped name) of a URDF fragment with nothing but transmissions; without it the
             transmissions of the URDF itself are read.
         joints: joints that move; all others are locked at zero, or at their nearest limit. Default: all.
+        gravity: (3,) as the root link of the URDF feels it, for a robot that hangs or is mounted on a wall [m/s2].
+            Default: (0, 0, -9.81).
 
     Returns:
         The robot. Its joints are in kinematic order, whatever the order of `joints`.
@@ -46,7 +49,7 @@ def load_robot(
         as_path(annotation, "load_robot: annotation")
     text = read_text(find_urdf(source))
     fragment = None if annotation is None else read_text(find_urdf(annotation))
-    return robot_from_text(text, str(source), fragment, joints, annotation_name=str(annotation or ""))
+    return robot_from_text(text, str(source), fragment, joints, gravity, annotation_name=str(annotation or ""))
 
 
 def robot_from_text(
@@ -54,6 +57,7 @@ def robot_from_text(
     source: str,
     annotation: str | None = None,
     joints: Sequence[str] | None = None,
+    gravity: Sequence[float] | None = None,
     *,
     annotation_name: str = "annotation",
 ) -> Robot:
@@ -64,6 +68,7 @@ def robot_from_text(
         source: where it came from, for messages and for saved models.
         annotation: text of the annotation fragment.
         joints: joints that move; all others are locked.
+        gravity: (3,) in the root link [m/s2]; (0, 0, -9.81) by default.
         annotation_name: where the annotation came from, for messages.
 
     Returns:
@@ -101,7 +106,8 @@ def robot_from_text(
     )
     for note in notes:
         python_warnings.warn(f"{source}: {note}", SeaIdentWarning, stacklevel=3)
-    return replace(robot, warnings=tuple(notes))
+    robot = replace(robot, warnings=tuple(notes))
+    return robot if gravity is None else robot.with_gravity(gravity)
 
 
 def _annotation(tree: UrdfTree, source: str, annotation: str | None, name: str) -> Annotation:

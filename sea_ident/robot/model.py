@@ -1,5 +1,6 @@
 """The robot: links and rotors as one Pinocchio model, exact in the plane and in 3-D."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,6 +15,9 @@ from sea_ident.robot.limits import Limits
 
 INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 INERTIAL_UNITS = ("kg", "kg m", "kg m", "kg m") + ("kg m2",) * 6
+
+LARGEST_GRAVITY = 30.0
+"""That of the largest planet [m/s2]."""
 
 LONGEST_LEVER = 10.0
 """Distance of a centre of mass from its joint up to which it is as good as any to compute with [m]."""
@@ -231,6 +235,35 @@ class Robot:
                 at = pin.Inertia(1.0, model.jointPlacements[index].translation, np.zeros((3, 3)))
                 out[bodies[parent]] -= added * at.toDynamicParameters()
         return out.ravel()
+
+    @property
+    def gravity(self) -> FloatArray:
+        """(3,) gravity, as the root link of the URDF feels it [m/s2]."""
+        return np.array(self.model.gravity.linear)
+
+    def with_gravity(self, gravity: Sequence[float] | FloatArray) -> "Robot":
+        """The same robot under another gravity, as the root link feels it.
+
+        Args:
+            gravity: (3,) [m/s2].
+
+        Raises:
+            RobotError: it is none of a robot.
+        """
+        try:
+            given = np.asarray(gravity, dtype=np.float64)
+        except (TypeError, ValueError):
+            given = np.zeros(0)
+        if given.shape != (3,) or not np.all(np.isfinite(given)):
+            raise RobotError(f"gravity is {gravity!r}; give three numbers [m/s2], as (0, 0, -9.81)")
+        if np.linalg.norm(given) > LARGEST_GRAVITY:
+            raise RobotError(
+                f"gravity is {given.tolist()}, {np.linalg.norm(given):.4g} m/s2; is it in m/s2? Usual is 9.81 at most"
+            )
+        model, extended = pin.Model(self.model), pin.Model(self.extended_model)
+        model.gravity = pin.Motion(given, np.zeros(3))
+        extended.gravity = pin.Motion(given, np.zeros(3))
+        return replace(self, model=model, extended_model=extended)
 
     def with_inertial_parameters(self, inertial: FloatArray, rotor_inertias: FloatArray) -> "Robot":
         """The same robot with other inertial parameters.

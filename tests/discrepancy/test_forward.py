@@ -38,7 +38,14 @@ def without_reference(recording):
 @pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "amounts"),
-    [("encoder_offset", {"offset": 0.02}), ("position_delay", {"delay": 0.004}), ("torque_delay", {"delay": -0.012})],
+    [
+        ("encoder_offset", {"offset": 0.02}),
+        ("motor_encoder_offset", {"offset": 0.02}),
+        ("joint_offset", {"offset": 0.2}),
+        ("position_delay", {"delay": 0.004}),
+        ("position_delay", {"delay": 0.01, "lag": 0.008}),
+        ("torque_delay", {"delay": -0.012}),
+    ],
 )
 def test_a_model_with_the_true_error_of_a_sensor_simulates_what_was_recorded(leg, series, name, amounts):
     effect = make_effect(name, "knee", **amounts)

@@ -38,6 +38,9 @@ KINDS = {
     "shape": (planted("stribeck_friction", "knee", [0.8], speed=0.15, exponent=1.5), 2e-4),
     "memory": (planted("spring_hysteresis", "knee", [0.8, 0.8], slip=0.005), 3e-4),
     "signal": (planted("encoder_offset", "knee", [], offset=0.02), 2e-4),
+    "motor": (planted("motor_encoder_offset", "knee", [], offset=0.1), 2e-4),
+    "joint": (planted("joint_offset", "knee", [], offset=0.1), 2e-4),
+    "filter": (planted("position_delay", "knee", [], delay=0.01, lag=0.008), 2e-4),
     "spring": (planted("asymmetric_spring", "knee", [15.0], exponent=1.0), 3e-4),
     "link": (planted("link_friction", "knee", [0.1, 0.15]), 3e-4),
 }

@@ -27,6 +27,11 @@ TOGETHER = {
         make_effect("encoder_eccentricity", "knee", sine=0.01, cosine=0.02),
         make_effect("encoder_offset", "knee", offset=0.03),
     ),
+    "a filtered encoder of another zero": (
+        make_effect("position_delay", "knee", delay=0.01, lag=0.008),
+        make_effect("motor_encoder_offset", "knee", offset=0.05),
+        make_effect("joint_offset", "knee", offset=0.1),
+    ),
     "a late encoder before a flexible link": (
         make_effect("position_delay", "knee", delay=0.003),
         make_effect("link_flexibility", "knee", compliance=1e-4),

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from sea_ident.cli.inputs import read_columns, read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, ForeignColumns, Jobs, JointNames, Period
+from sea_ident.cli.options import AnnotationFile, AsJson, ForeignColumns, Gravity, Jobs, JointNames, Period
 from sea_ident.cli.output import emit, progress
 
 
@@ -21,6 +21,7 @@ def batch(
     jobs: Jobs = -1,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
+    gravity: Gravity = None,
     as_json: AsJson = False,
 ) -> None:
     """Identify every recording of a folder, into one table.
@@ -29,7 +30,7 @@ def batch(
     """
     from sea_ident.batch import identify_batch
 
-    loaded = read_robot(robot, annotation, joints)
+    loaded = read_robot(robot, annotation, joints, gravity)
     with progress("identifying", 1) as tell:
 
         def count(done: int, total: int, name: str) -> None:

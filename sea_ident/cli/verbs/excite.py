@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sea_ident.cli.inputs import read_limits, read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, Jobs, JointNames, RobotSource, Seed
+from sea_ident.cli.options import AnnotationFile, AsJson, Gravity, Jobs, JointNames, RobotSource, Seed
 from sea_ident.cli.output import best_so_far, check_targets, emit, note, progress
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ def excite(
     periods: Annotated[int, typer.Option("--periods", help="Whole periods in T.")] = 1,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
+    gravity: Gravity = None,
     as_json: AsJson = False,
 ) -> None:
     """Design an exciting trajectory inside the limits of a robot. Ctrl-C keeps the best so far."""
@@ -100,7 +101,7 @@ def excite(
     _check_samples(base_frequency, harmonics, rate, periods, csv is not None, yaml is not None or bag is not None)
     if bag is not None:
         bag_types()
-    loaded = read_robot(robot, annotation, joints)
+    loaded = read_robot(robot, annotation, joints, gravity)
     limits = read_limits(loaded, half_space, self_collision)
     with progress("designing the excitation", starts) as tell, best_so_far():
         ended: set[int] = set()

@@ -12,6 +12,7 @@ from sea_ident.cli.options import (
     AsJson,
     Between,
     ForeignColumns,
+    Gravity,
     JointNames,
     Period,
     RecordingFile,
@@ -34,13 +35,14 @@ def identify(
     between: Between = None,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
+    gravity: Gravity = None,
     as_json: AsJson = False,
 ) -> None:
     """Identify the model of a robot and its springs from a recording."""
     from sea_ident.estimation import identify as run
 
     check_targets(out, report, inputs=(robot, annotation, recording))
-    loaded = read_robot(robot, annotation, joints)
+    loaded = read_robot(robot, annotation, joints, gravity)
     effects = read_effects(loaded, add)
     columns = read_columns(column)
     with progress(f"reading {recording.name}", SHARES) as tell:

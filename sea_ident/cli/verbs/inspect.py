@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from sea_ident.cli.inputs import read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, RobotSource
+from sea_ident.cli.options import AnnotationFile, AsJson, Gravity, JointNames, RobotSource
 from sea_ident.cli.output import emit, progress
 
 if TYPE_CHECKING:
@@ -15,13 +15,14 @@ def inspect(
     robot: RobotSource,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
+    gravity: Gravity = None,
     as_json: AsJson = False,
 ) -> None:
     """Show joints, actuators, limits and base parameters of a robot."""
     from sea_ident.base_parameters import find_base_parameters
     from sea_ident.effects import base_effects
 
-    loaded = read_robot(robot, annotation, joints)
+    loaded = read_robot(robot, annotation, joints, gravity)
     with progress("finding base parameters"):
         base = find_base_parameters(loaded, base_effects(loaded))
     emit(_record(loaded, base), f"{loaded.summary()}\n{base.summary()}", as_json=as_json)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from sea_ident.cli.inputs import read_robot
-from sea_ident.cli.options import AnnotationFile, AsJson, JointNames, RobotSource, Seed
+from sea_ident.cli.options import AnnotationFile, AsJson, Gravity, JointNames, RobotSource, Seed
 from sea_ident.cli.output import check_targets, emit, progress
 
 
@@ -23,6 +23,7 @@ def simulate(
     seed: Seed = 0,
     annotation: AnnotationFile = None,
     joints: JointNames = None,
+    gravity: Gravity = None,
     as_json: AsJson = False,
 ) -> None:
     """Record a simulated robot that follows an excitation.
@@ -36,7 +37,7 @@ def simulate(
 
     check_targets(out, inputs=(robot, annotation, excitation))
     check_suffix(out)
-    loaded = read_robot(robot, annotation, joints)
+    loaded = read_robot(robot, annotation, joints, gravity)
     reference = read_excitation(excitation)
     with progress("waiting for the motion to be periodic", periods) as tell:
 
