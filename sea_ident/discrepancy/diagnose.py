@@ -83,6 +83,8 @@ def diagnose(
     On Linux a second core is used where there is one, to the same result; the environment variable
     `LOKY_MAX_CPU_COUNT`, set to 1, keeps it to one, and in a worker process of several it has but one.
 
+    With a model that was identified with `unknown_zero`, every recording is read with the zero of its own.
+
     Args:
         model: the model; its effects are refitted to the recording, so a model from CAD serves as well.
         recording: what was measured; ten periods or more for a name without reservation.

@@ -15,7 +15,6 @@ from sea_ident.motion import Motion
 TAKES = 0.3
 """Residual with zeros of their own, over that without, up to which they are the reason [-]."""
 
-
 EXPLAINS = 0.3
 """Share of the change of the torque of a spring that its law may leave then [-]."""
 
@@ -68,6 +67,7 @@ def zeros_apart(observations: Observations, known: Collection[str]) -> tuple[Oth
 
 
 def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[str]) -> list[OtherZero]:
+    """The springs of some joints whose misfit goes with a difference of zeros, by base parameters (b,)."""
     # what follows from a wrong period or a column that is doubted is no fault of a zero
     if not joints or observations.processed.doubts:
         return []
