@@ -15,7 +15,9 @@ from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
+from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.exceptions import EffectError
 
 TAKEN_UP = 1e-4
@@ -48,9 +50,12 @@ def beside_others(bench: Bench, now: Settled, joint: str) -> Iterator[Beside]:
         joint: the joint.
     """
     fit = now.fit
+    constant = any(isinstance(effect, SpringOffset) and effect.joint == joint for effect in fit.effects)
     for effect in candidate_effects(bench, fit.effects):
         if effect.joint != joint or effect.shapes:
             continue
+        if constant and isinstance(effect, MotorEncoderOffset):
+            continue  # the constant stands for it
         try:
             directions = _directions(bench, now, bench.anchored((*fit.effects, effect), fit.parameters)[-1])
         except EffectError:

@@ -11,7 +11,6 @@ from chains import rigid_chain
 from sea_ident import build_regressor, identify, load_robot
 from sea_ident.discrepancy import diagnose
 from sea_ident.effects import Anchor, State, base_effects, effect_from_dict, make_effect, spring_effects
-from sea_ident.effects.base_tilt import with_gravity
 from sea_ident.effects.unfelt_moments import level_axes
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.motion import FourierSeries, Motion
@@ -59,7 +58,7 @@ def test_an_axis_in_the_plane_of_a_robot_is_not_felt_however_the_plane_was_given
     felt = int(np.argmax(np.linalg.norm(exact, axis=(0, 1))))
     # turned about the axis that is felt nothing changes in kind; about the other the plane is no upright one
     for turn, seen in ((1e-4, False), (1e-2, True)):
-        leaning = with_gravity(leg, pin.exp3(turn * axes[1 - felt]) @ np.asarray(leg.model.gravity.linear))
+        leaning = leg.with_gravity(pin.exp3(turn * axes[1 - felt]) @ np.asarray(leg.model.gravity.linear))
         columns = tilt.evaluate(State(leaning, motion)).link
         sizes = np.linalg.norm(columns, axis=(0, 1))
         assert sizes[1 - felt] == 0.0 or seen
@@ -151,7 +150,7 @@ def test_a_simulation_has_the_first_moments_that_a_tilt_was_found_with():
     right = robot.inertial_parameters.copy()
     right[1] -= 0.1
     expected = robot.with_inertial_parameters(right, robot.rotor_inertias())
-    expected = with_gravity(expected, np.asarray(there.model.gravity.linear))
+    expected = expected.with_gravity(np.asarray(there.model.gravity.linear))
     np.testing.assert_allclose(inverse_dynamics(there, motion)[0], inverse_dynamics(expected, motion)[0], atol=1e-9)
 
 

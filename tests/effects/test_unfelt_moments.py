@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 
 from sea_ident import load_robot
-from sea_ident.effects.base_tilt import with_gravity
 from sea_ident.effects.unfelt_moments import unfelt_moments
 
 
@@ -25,7 +24,7 @@ def test_they_are_those_across_the_first_axis_where_that_is_upright(name, expect
 def test_a_base_that_leans_feels_them_and_one_without_gravity_nothing():
     robot = load_robot("hebi_x5")
     gravity = np.asarray(robot.model.gravity.linear)
-    assert unfelt_moments(with_gravity(robot, pin.exp3(np.array([0.1, 0.0, 0.0])) @ gravity)) == ()
-    assert unfelt_moments(with_gravity(robot, np.zeros(3))) == ()
+    assert unfelt_moments(robot.with_gravity(pin.exp3(np.array([0.1, 0.0, 0.0])) @ gravity)) == ()
+    assert unfelt_moments(robot.with_gravity(np.zeros(3))) == ()
     # an axis given to seven digits is upright
-    assert len(unfelt_moments(with_gravity(robot, pin.exp3(np.array([1e-7, 0.0, 0.0])) @ gravity))) == 2
+    assert len(unfelt_moments(robot.with_gravity(pin.exp3(np.array([1e-7, 0.0, 0.0])) @ gravity))) == 2
