@@ -27,6 +27,9 @@ BETTER = 0.1
 ALIKE = 2.0
 """Times what is left at best up to which directions of gravity are alike [-]."""
 
+HEAVIER = 3.0
+"""Times as heavy as they are described, or as light, that bodies may be for gravity to act another way [-]."""
+
 NEARLY = 0.1
 """Share by which directions of gravity differ at least to be others [-]."""
 
@@ -107,14 +110,20 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
         return None
     orders = (*_orders(robot, "current" if by_current else "tau_motor"), *_mountings(robot))
     found = [(*tried(order), order) for order in orders]
-    possible = [(left, order) for left, positive, order in found if positive]
+    weights = [None if o.gravity is None else _weight(robot, motion, torque, o.gravity) for o in orders]
+    # bodies that are free feel a tilt of some degrees as well as a wall, where none of the axes lies: by their weight
+    possible = [
+        (left, order)
+        for (left, positive, order), weight in zip(found, weights, strict=True)
+        if positive and (weight is None or 1.0 / HEAVIER < weight[0] < HEAVIER)
+    ]
     if not possible:
         return None
     after, order = min(possible, key=lambda pair: pair[0])
     if order.gravity is not None:
         # bodies of any sign feel gravity from either side: those of the description tell
         alike = [pair for pair in possible if pair[1].gravity is not None and pair[0] <= ALIKE * after]
-        after, order = max(alike, key=lambda pair: _as_described(robot, motion, torque, pair[1].gravity))
+        after, order = max(alike, key=lambda pair: _weight(robot, motion, torque, pair[1].gravity)[1])
     if not (after < BETTER * before and after < EXPLAINED):
         return None
     return (
@@ -123,11 +132,13 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     )
 
 
-def _as_described(robot: Robot, motion: Motion, torque: FloatArray, gravity: FloatArray | None) -> float:
-    """How well the weight of the bodies as they are described goes with a torque (N, n) [-]."""
+def _weight(robot: Robot, motion: Motion, torque: FloatArray, gravity: FloatArray | None) -> tuple[float, float]:
+    """How often the weight of the bodies as described is in a torque (N, n), and how well it goes with it [-]."""
     acts = robot.gravity if gravity is None else gravity
     weight = State(robot, motion).gravity_torque(acts, robot.inertial_parameters)
-    return float(np.sum(weight * torque) / max(float(np.linalg.norm(weight) * np.linalg.norm(torque)), 1e-300))
+    size = max(float(np.linalg.norm(weight)), 1e-300)
+    along = float(np.sum(weight * torque)) / size
+    return along / size, along / max(float(np.linalg.norm(torque)), 1e-300)
 
 
 def _orders(robot: Robot, torque: str) -> Iterator[_Order]:

@@ -110,6 +110,16 @@ def test_a_robot_on_a_wall_is_told_from_one_that_stands(gravity):
     assert misplaced_columns(right, base_effects(right), process(recording, right, period=5.0)) is None
 
 
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_tilt_of_some_degrees_is_no_wall():
+    """Where no axis lies level the bodies, which are free, may be as light as that."""
+    text = ARM.format(mount="", foot="base", drives=DRIVES).replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>')
+    level = robot_from_text(text, "arm.urdf")
+    tilted = level.with_gravity(pin.exp3(np.array([0.05, 0.03, 0.0])) @ np.array([0.0, 0.0, -9.81]))
+    recording = simulate(tilted, _series(), periods=4, seed=1).recording
+    assert misplaced_columns(level, base_effects(level), process(recording, level, period=5.0)) is None
+
+
 def _series():
     rng = np.random.default_rng(2)
     return FourierSeries(0.2, np.array([0.2, -0.3]), *(0.25 * rng.normal(size=(2, 2, 4))))
