@@ -27,8 +27,11 @@ BETTER = 0.1
 ALIKE = 2.0
 """Times what is left at best up to which directions of gravity are alike [-]."""
 
-HEAVIER = 3.0
+HEAVIER = 2.0
 """Times as heavy as they are described, or as light, that bodies may be for gravity to act another way [-]."""
+
+FELT = 0.05
+"""Share of the weight that is felt from another side from which on a robot is not level [-]."""
 
 NEARLY = 0.1
 """Share by which directions of gravity differ at least to be others [-]."""
@@ -108,10 +111,11 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     before, _ = tried(_Order(own, own, own, plain, plain, ""))
     if before < LARGE:
         return None
-    orders = (*_orders(robot, "current" if by_current else "tau_motor"), *_mountings(robot))
+    mountings = _mountings(robot) if _feels_gravity(robot, motion) else ()
+    orders = (*_orders(robot, "current" if by_current else "tau_motor"), *mountings)
     found = [(*tried(order), order) for order in orders]
     weights = [None if o.gravity is None else _weight(robot, motion, torque, o.gravity) for o in orders]
-    # bodies that are free feel a tilt of some degrees as well as a wall, where none of the axes lies: by their weight
+    # bodies that are free may have any weight, and as they are described about theirs
     possible = [
         (left, order)
         for (left, positive, order), weight in zip(found, weights, strict=True)
@@ -130,6 +134,14 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
         f"{processed.source}: {order.text}. With that the model leaves {100.0 * after**0.5:.2g} % of the torque beyond "
         f"its noise, without it {100.0 * before**0.5:.2g} %"
     )
+
+
+def _feels_gravity(robot: Robot, motion: Motion) -> bool:
+    """Whether the bodies as described are felt as the robot is: else it is level, and a tilt would do for a wall."""
+    state, size, bodies = State(robot, motion), float(np.linalg.norm(robot.gravity)), robot.inertial_parameters
+    ways = (robot.gravity, *(size * np.eye(3)))
+    own, *others = (float(np.linalg.norm(state.gravity_torque(way, bodies))) for way in ways)
+    return own > FELT * max(others)
 
 
 def _weight(robot: Robot, motion: Motion, torque: FloatArray, gravity: FloatArray | None) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import diagnose
-from sea_ident.discrepancy.one_zero import as_one_zero
+from sea_ident.discrepancy.one_zero import _single, as_one_zero
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 from sea_ident.estimation import identify
@@ -85,6 +85,7 @@ def test_what_is_not_of_one_joint_is_left(nothing_missing, pair):
     """Gravity turns with the first joint only."""
     bench, start = nothing_missing
     effects = tuple(make_effect(name, joint) for name, joint in pair)
+    assert _single(bench, *effects, start.fit.parameters) is None
     fit = bench.predicted((*start.fit.effects, *effects), start.fit.parameters)
     now = Settled(fit, start.noise)
     after, left = as_one_zero(bench, now, 2)

@@ -7,7 +7,10 @@ import pytest
 
 from sea_ident.discrepancy import diagnose
 from sea_ident.discrepancy.diagnose import model_effects
+from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.own_zeros import OwnZero, joints_with_own_zeros, own_zeros
+from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.settle import settle
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import identify
 from sea_ident.exceptions import SeaIdentWarning
@@ -91,3 +94,19 @@ def test_a_constant_that_the_model_has_is_no_zero(laboratory, leg):
     assert joints_with_own_zeros(effects) == {"knee"}
     assert joints_with_own_zeros([SpringOffset("knee")]) == set()
     assert np.count_nonzero([isinstance(e, SpringOffset) for e in effects]) == 1
+
+
+@pytest.mark.parametrize(("kind", "own"), [(OwnZero, True), (SpringOffset, False)])
+def test_the_constant_of_a_zero_of_its_own_is_not_foretold(laboratory, kind, own):
+    """That of a spring is: it is there on every motion."""
+    recording, later = laboratory.record(periods=8), laboratory.record(periods=8, seed=11)
+    shown = recording.replace_columns({"theta_knee": recording.columns["theta_knee"] + 0.002})
+    effects = (*laboratory.effects, kind("knee"))
+    first, other = (laboratory.bench(r, effects) for r in (shown, later))
+    start = settle(first, first.effects)
+    before = tried(other, Selection(start, start, 0, ()), "later").before
+    knee = [e for e, equation in enumerate(other.data.equations) if equation.joint == "knee"]
+    constant = float(np.max(np.abs(before.residual[0, knee])))
+    # 200 N m/rad times the difference of the zeros
+    assert (constant < 0.05) is own
+    assert own or constant == pytest.approx(0.4, rel=0.3)

@@ -115,7 +115,7 @@ def test_a_tilt_of_some_degrees_is_no_wall():
     """Where no axis lies level the bodies, which are free, may be as light as that."""
     text = ARM.format(mount="", foot="base", drives=DRIVES).replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>')
     level = robot_from_text(text, "arm.urdf")
-    tilted = level.with_gravity(pin.exp3(np.array([0.05, 0.03, 0.0])) @ np.array([0.0, 0.0, -9.81]))
+    tilted = level.with_gravity(pin.exp3(np.array([0.2, 0.1, 0.0])) @ np.array([0.0, 0.0, -9.81]))
     recording = simulate(tilted, _series(), periods=4, seed=1).recording
     assert misplaced_columns(level, base_effects(level), process(recording, level, period=5.0)) is None
 
