@@ -15,10 +15,8 @@ from sea_ident.effects.base_tilt import BaseTilt
 from sea_ident.effects.encoder_offset import EncoderOffset
 from sea_ident.effects.joint_offset import JointOffset
 from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
+from sea_ident.effects.offset import Offset
 from sea_ident.effects.spring_offset import SpringOffset
-
-OF_A_JOINT = (EncoderOffset, MotorEncoderOffset, JointOffset)
-"""Wrong zeros of a joint with a spring: of q, of theta, of both."""
 
 
 def as_one_zero(bench: Bench, now: Settled, added: int) -> tuple[Settled, list[int]]:
@@ -53,7 +51,7 @@ def as_one_zero(bench: Bench, now: Settled, added: int) -> tuple[Settled, list[i
 def _single(bench: Bench, one: Effect, two: Effect, parameters: Mapping[str, float]) -> Effect | None:
     """The zero that two effects may be; None where they are none of one joint."""
     robot = bench.robot
-    zeros = [effect for effect in (one, two) if isinstance(effect, (*OF_A_JOINT, SpringOffset))]
+    zeros = [effect for effect in (one, two) if isinstance(effect, Offset | SpringOffset)]
     tilted = any(isinstance(effect, BaseTilt) for effect in (one, two))
     joints = {str(effect.joint) for effect in zeros}
     if len(zeros) + tilted < 2 or len(joints) != 1:
@@ -77,7 +75,7 @@ def _single(bench: Bench, one: Effect, two: Effect, parameters: Mapping[str, flo
     return EncoderOffset(joint, offset=of_q) if JointOffset in kinds else MotorEncoderOffset(joint, offset=of_theta)
 
 
-def _size(effect: EncoderOffset | MotorEncoderOffset | JointOffset | SpringOffset, known: Mapping[str, float]) -> float:
+def _size(effect: Offset | SpringOffset, known: Mapping[str, float]) -> float:
     """By how much a zero is off [rad] or [m]."""
     if isinstance(effect, SpringOffset):
         return -known[effect.parameter_name()] / known[f"{effect.joint}.spring_stiffness"]

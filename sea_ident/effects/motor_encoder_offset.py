@@ -1,16 +1,13 @@
 """A wrong zero of the motor encoder."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Shape
-from sea_ident.effects.signal import SignalEffect
+from sea_ident.effects.offset import Offset
 from sea_ident.exceptions import EffectError
-from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
 LARGEST = float(np.pi)
@@ -18,18 +15,12 @@ LARGEST = float(np.pi)
 
 
 @dataclass(frozen=True)
-class MotorEncoderOffset(SignalEffect):
+class MotorEncoderOffset(Offset):
     """The motor encoder shows theta + offset, of a joint with a spring.
 
     A spring is bent by as much more. To a linear one that is a constant torque, `spring_offset`, which stands for a
     small offset; a spring of another law bends about its own zero.
-
-    Attributes:
-        joint: joint at which it acts.
-        offset: [rad] or [m].
     """
-
-    offset: float = 0.0
 
     name: ClassVar[str] = "motor_encoder_offset"
     source: ClassVar[str] = "HEBI Robotics, X-series documentation, spring zero"
@@ -51,16 +42,6 @@ class MotorEncoderOffset(SignalEffect):
             raise EffectError(f"{self.name} at {self.joint!r}: the joint is rigid and has one zero, encoder_offset")
         return i
 
-    def corrected(self, robot: Robot, motion: Motion) -> Motion:
-        """Theta without the offset."""
-        theta = motion.theta.copy()
-        theta[:, self.required_index(robot)] -= self.offset
-        return replace(motion, theta=theta)
-
-    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Theta with the offset."""
-        i, out = self.required_index(robot), dict(signals)
-        if "theta" in signals:
-            out["theta"] = signals["theta"].copy()
-            out["theta"][:, i] += self.offset
-        return out
+    def shown(self, robot: Robot) -> tuple[str, ...]:
+        """Theta."""
+        return ("theta",)
