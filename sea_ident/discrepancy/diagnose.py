@@ -1,22 +1,20 @@
 """`diagnose`: where a model and a recording disagree, and which effect is missing."""
 
 import warnings as python_warnings
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection
+from dataclasses import replace
 
 from sea_ident.arguments import expect, expect_number
 from sea_ident.discrepancy import assess, check, words
 from sea_ident.discrepancy.against import against
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
 from sea_ident.discrepancy.breakaway import stiction
-from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.changing import Changing
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
-from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude, unexplained
-from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
+from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude
+from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all
 from sea_ident.discrepancy.data import period_data, wide_processing
 from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
 from sea_ident.discrepancy.diagnosis import Diagnosis
@@ -26,22 +24,15 @@ from sea_ident.discrepancy.findings import Verdict
 from sea_ident.discrepancy.gap import torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut, held_out
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
+from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.next_experiment import with_next_experiment
 from sea_ident.discrepancy.own_zeros import own_zeros
-from sea_ident.discrepancy.possible_springs import (
-    impossible_springs,
-    left_without_cubic,
-    with_fitted_zeros,
-    with_zeros_apart,
-    without_cubic,
-)
 from sea_ident.discrepancy.repaired import repair, with_repaired
 from sea_ident.discrepancy.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.same import not_the_same
-from sea_ident.discrepancy.search import Selection, search, still_needed, without
-from sea_ident.discrepancy.sensor_limits import limits, steps_cover
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.search import Selection, search, without
+from sea_ident.discrepancy.searching import Progress, compared, searched_with_possible_springs, unsearched
+from sea_ident.discrepancy.sensor_limits import limits
 from sea_ident.discrepancy.stand_ins import stand_ins
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
@@ -62,8 +53,6 @@ from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.recordings import Recording
 from sea_ident.side_by_side import follows, shared
 from sea_ident.simulation import Controller
-
-Progress = Callable[[str, float], None]
 
 
 @one_thread
@@ -173,11 +162,11 @@ def _diagnosed(
     tell("searching", 0.1)
     basic = completed(bench)
     if basic is not None:
-        found = _compared(bench, confirm(bench, basic.selection), changing)
+        found = compared(bench, confirm(bench, basic.selection), changing)
     elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful:
-        found = _unsearched(bench, changing)
+        found = unsearched(bench, changing)
     else:
-        found = _searched_with_possible_springs(bench, changing, tell, {other.joint: other.zero for other in apart})
+        found = searched_with_possible_springs(bench, changing, tell, {other.joint: other.zero for other in apart})
     bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
     alternatives: Alternatives = {}
@@ -220,92 +209,6 @@ def _diagnosed(
         tell("designing the next experiment", 0.97)
         diagnosis = with_next_experiment(diagnosis, bench, selection, alternatives)
     return replace(diagnosis, units=check.torque_units(robot))
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """What the mean of the periods and their comparison show, on which bench, and what a user should know of it."""
-
-    bench: Bench
-    confirmed: Confirmed
-    trends: TrendTest
-    notes: tuple[str, ...] = ()
-
-
-def _compared(bench: Bench, confirmed: Confirmed, changing: Changing, notes: tuple[str, ...] = ()) -> _Found:
-    return _Found(bench, confirmed, changing.compared(confirmed.bench, confirmed.final.fit), notes)
-
-
-def _searched_with_possible_springs(
-    bench: Bench, changing: Changing, tell: Progress, apart: Mapping[str, float]
-) -> _Found:
-    """Search, and once more without the cubic terms of springs that are impossible with what was found.
-
-    Args:
-        bench: the recording.
-        changing: what changes from period to period.
-        tell: progress.
-        apart: differences of zeros that explain the misfit of springs, by joint [rad] or [m].
-    """
-    begun = with_zeros_apart(bench, apart) if apart else None
-    found = _searched_beyond_steps(bench, changing, tell, begun)
-    impossible = impossible_springs(bench, found.confirmed.final.fit)
-    if not impossible:
-        return found
-    without = without_cubic(bench, impossible)
-    other = _searched_beyond_steps(without, changing, tell, with_fitted_zeros(without, impossible))
-    if any(other.confirmed.final.fit.parameters[f"{joint}.spring_stiffness"] < 0.0 for joint in impossible):
-        return found
-    return replace(other, notes=(*other.notes, *left_without_cubic(bench.robot, impossible)))
-
-
-def _searched_beyond_steps(bench: Bench, changing: Changing, tell: Progress, begun: Selection | None = None) -> _Found:
-    """Search, unless the steps of the encoders may be all that is left."""
-    if bench.data.step_errors is not None and steps_cover(bench, settle(bench, bench.effects)):
-        return _unsearched(bench, changing)
-    return _searched(bench, changing, tell, begun)
-
-
-def _searched(bench: Bench, changing: Changing, tell: Progress, begun: Selection | None = None) -> _Found:
-    """Search the mean, less what drifts within a period: periods are compared before, and after once more."""
-    start = settle(bench, bench.effects) if begun is None else begun.start
-    seen = start.fit if begun is None else begun.final.fit
-    before = changing.compared(bench, seen)
-    less = changing.less(bench, seen, before)
-    found = _searched_mean(less, changing, tell, begun, start if less is bench else None)
-    if found.trends.names != before.names and not (less is bench and _lacks_more(found)):
-        first = found.confirmed
-        nearly = explains_nearly_all(found.bench, first.selection.start.fit, first.selection.final)
-        again = changing.less(bench, first.final.fit, found.trends)
-        found = _searched_mean(again, changing, tell, still_needed(again, first.selection) if nearly else None)
-    bench, confirmed = searched_beside_reversals(found.bench, found.confirmed)
-    return replace(found, bench=bench, confirmed=confirmed)
-
-
-def _lacks_more(found: _Found) -> bool:
-    """Whether so much is left that what drifts is not what kept the rest from being found."""
-    confirmed = found.confirmed
-    return unexplained(confirmed) and remainder_share(confirmed.bench, confirmed.final) > found.trends.torque_change
-
-
-def _searched_mean(
-    bench: Bench,
-    changing: Changing,
-    tell: Progress,
-    begun: Selection | None = None,
-    start: Settled | None = None,
-) -> _Found:
-    confirmed = confirm(bench, search(bench, bench.effects, begun, start=start))
-    notes: tuple[str, ...] = ()
-    if unexplained(confirmed):
-        tell("searching without what is slow", 0.35)
-        second = without_the_slow(bench, confirmed)
-        if second is not None:
-            with_them = friction_of_the_slow(bench, second)
-            bench, confirmed = with_them or (second.bench, second)
-            notes = () if with_them else (words.slow_samples(bench.data),)
-    tell("comparing the periods", 0.5)
-    return _compared(bench, confirmed, changing, notes)
 
 
 def _tested(
@@ -408,14 +311,6 @@ def _on_centres(bench: Bench, selection: Selection) -> tuple[str, ...]:
     fit, count = selection.final.fit, len(selection.final.fit.effects)
     told = [k for k in range(count - selection.added, count) if stays_on_the_centre(bench, fit, k)]
     return tuple(words.on_the_centre(fit.effects[k].joint or "") for k in told)
-
-
-def _unsearched(bench: Bench, changing: Changing) -> _Found:
-    """The model as it is, and what could have been seen beside it."""
-    start = settle(bench, bench.effects)
-    candidates = tuple(scan(bench, start.fit, start.noise))
-    selection = Selection(start, start, 0, (), candidates, max(sum(c.tests for c in candidates), 1))
-    return _compared(bench, confirm(bench, selection), changing)
 
 
 def model_effects(model: Model) -> tuple[Effect, ...]:

@@ -4,7 +4,6 @@ The effect that the library lacks is planted from here and never registered.
 """
 
 import re
-import sys
 import warnings
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy import Verdict
+from sea_ident.discrepancy import Verdict, searching
 from sea_ident.discrepancy.changing import Changing
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import (
@@ -43,7 +42,6 @@ from sea_ident.effects.friction_drift import FrictionDrift
 from sea_ident.exceptions import SeaIdentWarning
 
 PERIOD = 5.0
-diagnosing = sys.modules["sea_ident.discrepancy.diagnose"]  # the function has the name of its module
 RIPPLE = ("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})
 
 
@@ -224,13 +222,13 @@ def test_a_search_is_repeated_only_for_what_drifts_enough(rippled, monkeypatch, 
 
     def searched(bench, *rest, **options):
         calls.append(bench)
-        return diagnosing._Found(bench, found, trends)
+        return searching.Found(bench, found, trends)
 
     monkeypatch.setattr(Changing, "compared", lambda *rest: drifting(None))
     monkeypatch.setattr(Changing, "less", lambda self, bench, *rest: bench)
-    monkeypatch.setattr(diagnosing, "_searched_mean", searched)
-    monkeypatch.setattr(diagnosing, "searched_beside_reversals", lambda *both: both)
-    diagnosing._searched(bench, Changing(None), lambda what, share: None)
+    monkeypatch.setattr(searching, "_searched_mean", searched)
+    monkeypatch.setattr(searching, "searched_beside_reversals", lambda *both: both)
+    searching._searched(bench, Changing(None), lambda what, share: None)
     assert len(calls) == searches
 
 

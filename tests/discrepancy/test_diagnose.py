@@ -11,6 +11,7 @@ import pytest
 
 import sea_ident
 from sea_ident import side_by_side
+from sea_ident.discrepancy import searching
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError
@@ -198,7 +199,7 @@ def test_nothing_is_concluded_of_positions_in_another_unit(leg, intact, intact_m
 
     for recording in (spoiled, one_pass):
         with monkeypatch.context() as patched:
-            patched.setattr(sys.modules["sea_ident.discrepancy.diagnose"], "_searched", searched)
+            patched.setattr(searching, "_searched", searched)
             found = sea_ident.diagnose(model, recording)
         assert (found.verdict, found.missing, found.model) == ("cannot_tell", (), None)
         assert "the warnings say what" in found.text

@@ -1,13 +1,12 @@
 """What sensors cannot show is no missing effect."""
 
-import importlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sea_ident import identify
-from sea_ident.discrepancy import Verdict, diagnose
+from sea_ident.discrepancy import Verdict, diagnose, searching
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.closing import SIGNALS
 from sea_ident.discrepancy.data import EquationKind, around_reversals, wide_processing
@@ -118,9 +117,8 @@ def test_a_floor_and_a_fit_follow_each_other_until_the_floor_has_room_for_the_st
 @pytest.mark.parametrize(("bits", "looked_for"), [(12, False), (14, True)])
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_coarse_encoders_are_told_and_nothing_is_named(laboratory, coarse, bits, looked_for, monkeypatch):
-    searches, module = [], importlib.import_module("sea_ident.discrepancy.diagnose")
-    searched = module._searched
-    monkeypatch.setattr(module, "_searched", lambda *given: searches.append(given) or searched(*given))
+    searches, searched = [], searching._searched
+    monkeypatch.setattr(searching, "_searched", lambda *given: searches.append(given) or searched(*given))
     model = identify(laboratory.leg, coarse[bits], period=PERIOD)
     found = diagnose(model, coarse[bits], holdout=laboratory.record(sensors=steps_of(bits)))
     assert found.verdict is Verdict.NONE
