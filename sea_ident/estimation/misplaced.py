@@ -114,20 +114,20 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     mountings = _mountings(robot) if _feels_gravity(robot, motion) else ()
     orders = (*_orders(robot, "current" if by_current else "tau_motor"), *mountings)
     found = [(*tried(order), order) for order in orders]
-    weights = [None if o.gravity is None else _weight(robot, motion, torque, o.gravity) for o in orders]
     # bodies that are free may have any weight, and as they are described about theirs
+    weights = [None if o.gravity is None else _weight(robot, motion, torque, o.gravity) for _, _, o in found]
     possible = [
-        (left, order)
+        (left, order, 0.0 if weight is None else weight[1])
         for (left, positive, order), weight in zip(found, weights, strict=True)
         if positive and (weight is None or 1.0 / HEAVIER < weight[0] < HEAVIER)
     ]
     if not possible:
         return None
-    after, order = min(possible, key=lambda pair: pair[0])
+    after, order, _ = min(possible, key=lambda each: each[0])
     if order.gravity is not None:
-        # bodies of any sign feel gravity from either side: those of the description tell
-        alike = [pair for pair in possible if pair[1].gravity is not None and pair[0] <= ALIKE * after]
-        after, order = max(alike, key=lambda pair: _weight(robot, motion, torque, pair[1].gravity)[1])
+        # and of any sign feel gravity from either side
+        alike = [each for each in possible if each[1].gravity is not None and each[0] <= ALIKE * after]
+        after, order, _ = max(alike, key=lambda each: each[2])
     if not (after < BETTER * before and after < EXPLAINED):
         return None
     return (
@@ -144,10 +144,9 @@ def _feels_gravity(robot: Robot, motion: Motion) -> bool:
     return own > FELT * max(others)
 
 
-def _weight(robot: Robot, motion: Motion, torque: FloatArray, gravity: FloatArray | None) -> tuple[float, float]:
+def _weight(robot: Robot, motion: Motion, torque: FloatArray, gravity: FloatArray) -> tuple[float, float]:
     """How often the weight of the bodies as described is in a torque (N, n), and how well it goes with it [-]."""
-    acts = robot.gravity if gravity is None else gravity
-    weight = State(robot, motion).gravity_torque(acts, robot.inertial_parameters)
+    weight = State(robot, motion).gravity_torque(gravity, robot.inertial_parameters)
     size = max(float(np.linalg.norm(weight)), 1e-300)
     along = float(np.sum(weight * torque)) / size
     return along / size, along / max(float(np.linalg.norm(torque)), 1e-300)

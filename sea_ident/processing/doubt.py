@@ -35,3 +35,10 @@ class Doubt:
 def texts_of(doubts: Iterable[Doubt], kind: DoubtKind) -> tuple[str, ...]:
     """What is said of one kind."""
     return tuple(doubt.text for doubt in doubts if doubt.kind is kind)
+
+
+def say_column(column: str, setting: str) -> str:
+    """How a user says what a column of a file is, in Python and on the command line."""
+    key, _, value = setting.partition("=")
+    quoted = repr(value) if key == "unit" else value
+    return f"say ColumnSource({column!r}, {key}={quoted}), on the command line --column '{column}={column},{setting}'"

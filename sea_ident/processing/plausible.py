@@ -3,10 +3,10 @@
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sea_ident._typing import FloatArray
-from sea_ident.processing.doubt import Doubt, DoubtKind
+from sea_ident.processing.broken_encoders import HARDLY, held, jumps, slips, stands_still
+from sea_ident.processing.doubt import Doubt, DoubtKind, say_column
 from sea_ident.recordings import Recording
 from sea_ident.robot import Joint, Robot
 
@@ -28,51 +28,14 @@ TOGETHER = 0.95
 RECOGNISED = 0.15
 """Deviation from a factor up to which it is recognised."""
 
-STILL = 20
-"""Equal samples in a row from which on an encoder stands still."""
-
-MOVED = 0.1
-"""Share of the range of a position by which it does not move unseen, or within a sample."""
-
-HARDLY = 0.1
-"""Motion of a motor as a share of that of its link up to which it may be held [-], and its encoder stand still."""
-
-FEW_COUNTS = 20
-"""Steps of an encoder up to which a joint does not move that stands still and then makes one."""
-
 HELD = 0.02
 """How far from where it is locked a joint may be [rad] or [m]: a brake gives that much."""
-
-TURNS = (2.0 * np.pi, 360.0, 400.0, 1.0, 1000.0, *(2.0**bits for bits in range(8, 33)))
-"""Spans after which encoders start again, in the units of files."""
-
-TURN_WITHIN = 0.03
-"""Deviation from one of them up to which it is recognised: a motion goes on within the sample [-]."""
-
-MOST_SLIPS = 3
-"""Steps of a deflection up to which they are lost turns."""
 
 SPEED_SAMPLES = 10
 """Samples over which a speed is taken, so that noise of an encoder is none."""
 
 TOO_FAST = 8.0
 """Usual speed over its limit from which on the unit is doubted."""
-
-FEWEST_CHANGES = 50
-"""Changes of a signal from which on their rhythm is looked at."""
-
-REGULAR = 0.9
-"""Share of changes equally far apart from which on a signal was held between samples; an encoder's depend on speed."""
-
-LASTING = 0.05
-"""Share of a recording before and after a step of a deflection from which on it may be a lasting one [-], ..."""
-
-STAYS = 0.5
-"""... and share of the step that its levels may differ by from it, and that the deflection must move less than twice
-as far as [-]."""
-
-FASTER = 6.0
-"""Speed over that of the faster tenth of the samples from which on a step is a jump."""
 
 
 def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray, torque: FloatArray) -> list[Doubt]:
@@ -111,13 +74,13 @@ def doubts(recording: Recording, robot: Robot, q: FloatArray, theta: FloatArray,
             sensors.append((f"theta_{joint.name}", theta[:, i]))
         for k, (name, values) in enumerate(sensors):
             partner = sensors[1 - k] if joint.elastic else None
-            doubt(DoubtKind.SENSOR, _still(recording.time, name, values, joint, partner))
-            doubt(DoubtKind.SENSOR, _jump(recording.time, name, values, joint))
-        if joint.elastic and not any(_jump(recording.time, name, values, joint) for name, values in sensors):
-            doubt(DoubtKind.SENSOR, _slip(recording.time, joint, theta[:, i] - q[:, i]))
+            doubt(DoubtKind.SENSOR, stands_still(recording.time, name, values, joint, partner))
+            doubt(DoubtKind.SENSOR, jumps(recording.time, name, values, joint))
+        if joint.elastic and not any(jumps(recording.time, name, values, joint) for name, values in sensors):
+            doubt(DoubtKind.SENSOR, slips(recording.time, joint, theta[:, i] - q[:, i]))
         sensors.append((f"the torque of {joint.name}", torque[:, i]))
         for name, values in sensors:
-            doubt(DoubtKind.SENSOR, _held(recording.time, name, values))
+            doubt(DoubtKind.SENSOR, held(recording.time, name, values))
     doubt(DoubtKind.POSITION, _not_held(recording, robot))
     return found
 
@@ -165,12 +128,6 @@ def _not_held(recording: Recording, robot: Robot) -> list[str]:
     ]
 
 
-def _say(column: str, setting: str) -> str:
-    key, _, value = setting.partition("=")
-    quoted = repr(value) if key == "unit" else value
-    return f"say ColumnSource({column!r}, {key}={quoted}), on the command line --column '{column}={column},{setting}'"
-
-
 def beyond_limits(recording: Recording, robot: Robot, q: FloatArray) -> list[str]:
     """Sentences about motions (M, n) [rad] or [m] somewhat outside the limits of their joints."""
     found = []
@@ -208,7 +165,7 @@ def _position(joint: Joint, lower: float, upper: float, q: FloatArray) -> list[s
     if low * factor >= lower - spare and high * factor <= upper + spare:
         long = "millimetres" if joint.prismatic else "degrees"
         both = f", and the same for theta_{joint.name}" if joint.elastic else ""
-        return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}{both}"]
+        return [f"{where}: is it in {long}? Then {say_column(column, f'unit={other}')}{both}"]
     return [f"{where}: is it in another unit, such as counts of the encoder (unit=counts,counts_per_rev=...)?"]
 
 
@@ -225,25 +182,8 @@ def _speed(time: FloatArray, joint: Joint, limit: float, q: FloatArray) -> list[
     factor, other, long = (0.001, "mm", "millimetres") if joint.prismatic else (np.pi / 180.0, "deg", "degrees")
     if usual * factor <= 2.0 * limit:
         both = f", and the same for theta_{joint.name}" if joint.elastic else ""
-        return [f"{where}: is it in {long}? Then {_say(column, f'unit={other}')}{both}"]
+        return [f"{where}: is it in {long}? Then {say_column(column, f'unit={other}')}{both}"]
     return [f"{where}: is it in another unit, such as counts of the encoder, or is time?"]
-
-
-def _held(time: FloatArray, name: str, values: FloatArray) -> list[str]:
-    """Whether a signal was sampled at a lower rate, and each value held until the next."""
-    changes = np.flatnonzero(np.diff(values) != 0.0)
-    if changes.size < FEWEST_CHANGES:
-        return []
-    apart = np.diff(changes)
-    usual = int(np.median(apart))
-    if usual < 2 or np.mean(np.abs(apart - usual) <= (1 if usual >= 4 else 0)) < REGULAR:
-        return []
-    interval = float(np.median(np.diff(time)))
-    return [
-        f"{name} changes at every {usual}th sample only, each {1e3 * usual * interval:.3g} ms: it was sampled at "
-        f"{1.0 / (usual * interval):.4g} Hz and held, so that it is late by up to that. Give the samples that it has "
-        "with a time of their own (ColumnSource(..., time=...), in a format with columns of different length)"
-    ]
 
 
 def _torque(recording: Recording, joint: Joint, limit: float, torque: FloatArray) -> list[str]:
@@ -257,7 +197,7 @@ def _torque(recording: Recording, joint: Joint, limit: float, torque: FloatArray
     column = f"current_{joint.name}"
     return [
         f"{column} times torque constant and gear ratio {where}: is the current in milliamperes? Then "
-        f"{_say(column, 'unit=mA')}; else look at <torqueConstant> and <mechanicalReduction>"
+        f"{say_column(column, 'unit=mA')}; else look at <torqueConstant> and <mechanicalReduction>"
     ]
 
 
@@ -286,7 +226,7 @@ def _slope(joint: Joint, q: FloatArray, theta: FloatArray) -> tuple[DoubtKind, l
     }
     for factor, (question, name, setting) in causes.items():
         if abs(slope / factor - 1.0) <= RECOGNISED and abs(correlation) > 0.7:
-            return DoubtKind.POSITION, [f"{where}: {question} Then {_say(name, setting)}"]
+            return DoubtKind.POSITION, [f"{where}: {question} Then {say_column(name, setting)}"]
     held = "is the motor held, as by friction or a brake? Or " if np.std(theta) < HARDLY * np.std(q) else ""
     return soft, [
         f"{where}, correlation {correlation:.2f}: {held}are both of this joint, in one unit, and theta after the gear? "
@@ -300,7 +240,9 @@ def _sensor(joint: Joint, torque: FloatArray, deflection: FloatArray) -> list[st
     if np.ptp(torque) == 0.0:
         return [f"{column} is constant, {torque[0]:g} {joint.torque_unit}: is the sensor dead? Leave it out"]
     if np.ptp(deflection) > 0.0 and np.corrcoef(torque, deflection)[0, 1] < -0.5:
-        return [f"{column} falls where the deflection rises: has it the wrong sign? Then {_say(column, 'sign=-1')}"]
+        return [
+            f"{column} falls where the deflection rises: has it the wrong sign? Then {say_column(column, 'sign=-1')}"
+        ]
     return []
 
 
@@ -312,91 +254,4 @@ def unused(recording: Recording, robot: Robot) -> list[str]:
     return [
         f"{', '.join(measured)}: not used here, where springs follow from the motor torque; "
         "identify_measured_springs fits them to the measured torque"
-    ]
-
-
-def _still(
-    time: FloatArray, name: str, values: FloatArray, joint: Joint, partner: tuple[str, FloatArray] | None
-) -> list[str]:
-    """Whether an encoder stands still while the other one of its joint moves, or jumps when it comes back."""
-    steps = np.abs(np.diff(values))
-    if np.ptp(values) <= FEW_COUNTS * np.min(steps[steps > 0.0], initial=np.inf):
-        return []  # it is held, or constant, which is said elsewhere
-    if partner is not None and np.ptp(values) < HARDLY * np.ptp(partner[1]):
-        return []
-    ends = np.flatnonzero(np.concatenate([np.diff(values) != 0.0, [True]]))
-    starts = np.concatenate([[0], ends[:-1] + 1])
-    for k in np.argsort(starts - ends, kind="stable")[:5]:
-        first, last = int(starts[k]), int(ends[k])
-        if last - first + 1 < STILL:
-            break
-        moves = None
-        if partner is not None and np.ptp(partner[1][first : last + 1]) > MOVED * np.ptp(partner[1]):
-            moves = f"while {partner[0]} moves by {np.ptp(partner[1][first : last + 1]):.3g} {joint.position_unit}"
-        elif last + 1 < len(values) and abs(values[last + 1] - values[last]) > MOVED * np.ptp(values):
-            moves = f"and then jumps by {values[last + 1] - values[last]:.3g} {joint.position_unit}"
-        if moves is not None:
-            return [
-                f"{name} stands still at {values[first]:.6g} {joint.position_unit} for {last - first + 1} samples from "
-                f"sample {first} (time {time[first]:g} s) {moves}: was the encoder dead? Leave out that part"
-            ]
-    return []
-
-
-def _jumps(time: FloatArray, values: FloatArray) -> NDArray[np.intp]:
-    """Samples before steps that no motion makes."""
-    steps = np.diff(values)
-    speed = np.abs(steps) / np.diff(time)
-    usual = float(np.percentile(speed, 90.0))
-    if usual == 0.0:
-        return np.zeros(0, dtype=np.intp)
-    return np.flatnonzero((speed > FASTER * usual) & (np.abs(steps) > MOVED * np.ptp(values)))
-
-
-def _slip(time: FloatArray, joint: Joint, deflection: FloatArray) -> list[str]:
-    """Whether a deflection makes a step of whole turns of the motor, or one that stays, too small for the positions.
-
-    Several steps of another size may be pushes, or play that is crossed.
-    """
-    if joint.actuator is None:
-        return []
-    jumps = _jumps(time, deflection)
-    if not jumps.size:
-        return []
-    told = _jump(time, f"theta_{joint.name} - q_{joint.name}", deflection, joint)
-    turn = np.inf if joint.prismatic else 2.0 * np.pi / abs(joint.actuator.gear_ratio)
-    turns = np.abs(np.diff(deflection)[jumps]) / turn
-    whole = (turns >= 0.5) & (np.abs(turns - np.round(turns)) <= TURN_WITHIN)
-    if jumps.size <= MOST_SLIPS and np.all(whole):
-        return [f"{told[0]} (a turn of the motor is {turn:.4g} {joint.position_unit} after its gear)"]
-    return told if jumps.size == 1 and _stays(deflection, int(jumps[0])) else []
-
-
-def _stays(deflection: FloatArray, k: int) -> bool:
-    """Whether what changes after a sample changes for good, by more than anything does before or after it.
-
-    A spring that is deflected as far, or play, comes back within a period.
-    """
-    before, after = deflection[: k + 1], deflection[k + 1 :]
-    if min(len(before), len(after)) < LASTING * len(deflection):
-        return False
-    level = float(np.median(after) - np.median(before))
-    step = float(after[0] - before[-1])
-    widest = float(max(np.ptp(before), np.ptp(after)))
-    return abs(level - step) < STAYS * abs(step) and abs(step) > STAYS * widest
-
-
-def _jump(time: FloatArray, name: str, values: FloatArray, joint: Joint) -> list[str]:
-    """Whether a position makes steps that no motion makes."""
-    steps, jumps = np.diff(values), _jumps(time, values)
-    if not jumps.size:
-        return []
-    k = int(jumps[0])
-    more = "" if jumps.size == 1 else f", and {jumps.size} times in all"
-    span = float(np.median(np.abs(steps[jumps])))
-    spans = [turn for turn in TURNS if abs(span / turn - 1.0) < TURN_WITHIN]
-    wraps = _say(name, f"wraps_at={spans[0]:.10g}") if jumps.size > 1 and spans else "say wraps_at=..."
-    return [
-        f"{name} jumps by {steps[k]:.4g} {joint.position_unit} after sample {k} (time {time[k]:g} s){more}: no motion "
-        f"does that. Lost counts or a spike: leave out that part; a sensor that wraps around: {wraps}"
     ]
