@@ -9,11 +9,13 @@ from sea_ident.discrepancy import diagnose
 from sea_ident.discrepancy.diagnose import model_effects
 from sea_ident.discrepancy.heldout import tried
 from sea_ident.discrepancy.own_zeros import OwnZero, joints_with_own_zeros, own_zeros
+from sea_ident.discrepancy.repair import repaired_model
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import settle
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import identify
 from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.processing import process
 
 JOINTS = ("hip", "knee", "ankle")
 
@@ -110,3 +112,18 @@ def test_the_constant_of_a_zero_of_its_own_is_not_foretold(laboratory, kind, own
     # 200 N m/rad times the difference of the zeros
     assert (constant < 0.05) is own
     assert own or constant == pytest.approx(0.4, rel=0.3)
+
+
+def test_a_repaired_model_does_not_know_the_zero_either(laboratory, leg):
+    """What is left of it in the recording that was read less a first guess is fitted with its spring."""
+    left = 0.001
+    recording = laboratory.record(periods=8)
+    shown = recording.replace_columns({"theta_knee": recording.columns["theta_knee"] + left})
+    bench = laboratory.bench(shown, (*laboratory.effects, OwnZero("knee")))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        model = identify(leg, recording, period=5.0)
+        repaired = repaired_model(model, process(shown, leg, period=5.0), settle(bench, bench.effects).fit)
+    zeros = {spring.joint: spring.zero for spring in repaired.springs}
+    assert zeros == {"hip": 0.0, "knee": pytest.approx(left, abs=2e-4), "ankle": 0.0}
+    assert not any(isinstance(effect, SpringOffset) for effect in repaired.spring_effects)
