@@ -4,6 +4,8 @@ import warnings as python_warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
 from sea_ident.effects.signal import SignalEffect
@@ -12,6 +14,7 @@ from sea_ident.exceptions import ExportError, OutputError, SeaIdentWarning
 from sea_ident.export.mjcf import mjcf_text
 from sea_ident.export.urdf import urdf_text
 from sea_ident.export.values import ExportValues, collect_values
+from sea_ident.robot.model import UPRIGHT
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,12 @@ def export_urdf(model: Model, path: str | Path) -> Export:
         notes.append(
             f"joints that the model holds are in the URDF as they were ({', '.join(model.robot.locked)}): load it with "
             f"joints, on the command line --joints {','.join(model.robot.joint_names)}, to have the robot of the model"
+        )
+    if not np.allclose(model.robot.gravity, UPRIGHT):
+        gravity = ", ".join(f"{value:.6g}" for value in model.robot.gravity)
+        notes.append(
+            f"a URDF has no place for gravity, here ({gravity}) m/s2: load it with gravity=({gravity}), on the command "
+            f"line --gravity={gravity.replace(' ', '')}"
         )
     return _write(path, "urdf", text, notes, [*warnings, *remarks])
 

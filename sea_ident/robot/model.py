@@ -16,6 +16,9 @@ from sea_ident.robot.limits import Limits
 INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 INERTIAL_UNITS = ("kg", "kg m", "kg m", "kg m") + ("kg m2",) * 6
 
+UPRIGHT = (0.0, 0.0, -9.81)
+"""Gravity of a robot that stands, as Pinocchio has it [m/s2]."""
+
 LARGEST_GRAVITY = 30.0
 """That of the largest planet [m/s2]."""
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from typer.testing import CliRunner
 
-from sea_ident import identify, load_robot, read_model, simulate
+from sea_ident import export_mjcf, export_urdf, identify, load_robot, read_model, simulate
 from sea_ident.cli.app import app
 from sea_ident.cli.inputs import read_robot
 from sea_ident.effects import base_effects
@@ -95,6 +95,11 @@ def test_a_model_keeps_its_gravity(tmp_path):
     again = read_model(tmp_path / "model.json").robot
     np.testing.assert_array_equal(again.gravity, (0.0, 9.81, 0.0))
     np.testing.assert_allclose(torque_of(again), torque_of(hanging))
+    notes = [export_urdf(model, tmp_path / "out.urdf").notes, export_mjcf(model, tmp_path / "out.xml").notes]
+    assert [sum("no place for gravity" in text and "--gravity=0,9.81,0" in text for text in n) for n in notes] == [1, 0]
+    written = load_robot(tmp_path / "out.urdf", gravity=(0.0, 9.81, 0.0))
+    assert written.joint_names == hanging.joint_names
+    assert 'gravity="0.0 9.81 0.0"' in (tmp_path / "out.xml").read_text()
 
 
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
