@@ -1,6 +1,6 @@
 """Effects that were added, replaced by better ones now that the others are there."""
 
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import TypeAlias
@@ -11,10 +11,12 @@ from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.fit import Fit, Solution
 from sea_ident.discrepancy.free_shapes import is_signal
 from sea_ident.discrepancy.judge import at_a_bound, comes_first, is_push, penalty, slowest, too_short
+from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.refit import AT_ONCE, of_every_kind, refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects import Effect
+from sea_ident.effects.load import LoadEffect
 from sea_ident.side_by_side import side_by_side
 
 RIGHT = 1.2
@@ -193,6 +195,8 @@ class _Trial:
         before, after = reduced.effects[:position], reduced.effects[position:]
         beat = price - fit.unit * (1.0 + penalty(match.effect, bench))
         new = refitted(bench, before, match.effect, after, noise, fit.parameters, beat)
+        if _carries(match.effect, (*before, *after)):
+            new = _anchored_anew(bench, new, noise, beat)
         ended, slack = new.effects[position], len(bench.slack_links(new)) > len(bench.slack_links(fit))
         ends = at_a_bound(ended) or slowest(ended) or too_short(bench, ended)
         possible = not (slack or ends) and physical(bench, new, position)
@@ -201,3 +205,15 @@ class _Trial:
             possible = comes_first(gain, match.explained, reduced)
         # in the unit of the model that it is compared with
         return _Outcome(new.solution, gain, new.statistic + fit.unit * penalty(ended, bench), possible)
+
+
+def _carries(effect: Effect, others: Sequence[Effect]) -> bool:
+    """Whether what depends on a load is at the joint of an effect: it was found with the torque of another one."""
+    return any(isinstance(other, LoadEffect) and other.joint == effect.joint for other in others)
+
+
+def _anchored_anew(bench: Bench, fit: Fit, noise: NoiseFloor, beat: float) -> Fit:
+    """A model whose effects know the load that it has by now; as it is where it is better with what they knew."""
+    effects = bench.anchored(fit.effects, fit.parameters)
+    new = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects), beat=beat)
+    return new if new.statistic < fit.statistic else fit

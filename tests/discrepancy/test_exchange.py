@@ -11,7 +11,8 @@ from sea_ident.discrepancy.columns import effect_key
 from sea_ident.discrepancy.exchange import Outdone, exchange
 from sea_ident.discrepancy.next_effect import next_effect
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.discrepancy.settle import Settled, settle, settle_again
+from sea_ident.effects import make_effect
 
 
 @pytest.fixture(scope="module")
@@ -175,3 +176,20 @@ def test_of_a_pair_in_two_places_the_second_is_forgotten_where_the_first_took_it
 def test_of_a_pair_in_two_places_the_second_may_take_its_own(matches):
     assert matches(200.0, 10.0) == ((2, "model 1"), {key("own 0"), key("own 1")})
     assert matches(200.0, 200.0) == ((2, None), {key("own 0"), key("own 1")})
+
+
+@pytest.mark.scenario
+def test_what_acts_by_a_load_follows_when_what_carries_it_is_replaced(laboratory):
+    """A torque constant was held to the constant of a spring that was taken out, and play was told for a zero."""
+    planted = [("encoder_offset", "knee", [], {"offset": -0.02}), ("torque_constant", "knee", [0.3], {})]
+    bench = laboratory.bench(laboratory.record(planted))
+    start = settle(bench, bench.effects)
+    model = [make_effect("spring_offset", "knee"), make_effect("torque_constant", "knee")]
+    now = settle_again(bench, bench.fit((*start.fit.effects, *model), start.noise, start=start.fit.parameters))
+    for _ in range(3):
+        now = settle_again(bench, now.fit)
+    after = exchange(bench, now, 2, {})
+    first, second = after.fit.effects[-2:]
+    assert (first.name, second.name) == ("encoder_offset", "torque_constant")
+    assert first.offset == pytest.approx(-0.02, rel=0.02)
+    assert after.fit.parameters["knee.torque_constant"] == pytest.approx(0.3, rel=0.05)
