@@ -1,12 +1,12 @@
 """Where a motor lingers, what no model has must not hide what the rest of the motion shows."""
 
-import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy import searching
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.conclude import unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
@@ -17,7 +17,6 @@ from sea_ident.effects import base_effects, spring_effects
 from sea_ident.motion import FourierSeries
 
 PERIOD = 5.0
-diagnosing = sys.modules["sea_ident.discrepancy.diagnose"]  # the function has the name of its module
 
 
 @pytest.fixture(scope="module")
@@ -120,16 +119,16 @@ def test_where_the_slow_samples_show_a_friction_they_are_compared_again(monkeypa
     """And nobody is told that they were left out."""
     bench, far, near = (SimpleNamespace(effects=(), data=name) for name in ("usual", "far", "near"))
     first, second, third = (SimpleNamespace(name=name, bench=far) for name in ("first", "second", "third"))
-    monkeypatch.setattr(diagnosing, "search", lambda *_, **__: None)
-    monkeypatch.setattr(diagnosing, "confirm", lambda *_: first)
-    monkeypatch.setattr(diagnosing, "unexplained", lambda confirmed: confirmed is first)
-    monkeypatch.setattr(diagnosing, "without_the_slow", lambda bench, confirmed: second)
+    monkeypatch.setattr(searching, "search", lambda *_, **__: None)
+    monkeypatch.setattr(searching, "confirm", lambda *_: first)
+    monkeypatch.setattr(searching, "unexplained", lambda confirmed: confirmed is first)
+    monkeypatch.setattr(searching, "without_the_slow", lambda bench, confirmed: second)
     monkeypatch.setattr(
-        diagnosing, "friction_of_the_slow", lambda *given: (near, third) if shown and given == (bench, second) else None
+        searching, "friction_of_the_slow", lambda *given: (near, third) if shown and given == (bench, second) else None
     )
-    monkeypatch.setattr(diagnosing, "_compared", lambda *given: given)
-    monkeypatch.setattr(diagnosing.words, "slow_samples", lambda data: f"without the slow: {data}")
-    found = diagnosing._searched_mean(bench, None, lambda what, share: None)
+    monkeypatch.setattr(searching, "compared", lambda *given: given)
+    monkeypatch.setattr(searching.words, "slow_samples", lambda data: f"without the slow: {data}")
+    found = searching._searched_mean(bench, None, lambda what, share: None)
     assert found == ((near, third, None, ()) if shown else (far, second, None, ("without the slow: far",)))
 
 
