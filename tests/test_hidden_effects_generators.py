@@ -30,7 +30,7 @@ from tests.benchmarks.hidden_effects import catalogue, forms, gap, generate, pro
 from tests.benchmarks.hidden_effects.case import Case, Planted, generator
 from tests.benchmarks.hidden_effects.draw import draw_case, trajectories_of, truth_of
 from tests.benchmarks.hidden_effects.drawn_robots import MOST_JOINTS, drawn_name, drawn_robot
-from tests.benchmarks.hidden_effects.engine import STEP, Exact, Friction, simulate_mujoco
+from tests.benchmarks.hidden_effects.engine import STEP, Exact, Friction, share_of_step, simulate_mujoco
 from tests.benchmarks.hidden_effects.mjcf import COUPLED_SHARE, Coupling, Stages, build_mjcf
 from tests.benchmarks.hidden_effects.plants import Truth, drawn_truth, nominal_robot, nominal_truth
 from tests.benchmarks.hidden_effects.project_engine import planted_effects
@@ -107,6 +107,32 @@ def test_regression_on_mujoco_states_recovers_base_parameters(name: str) -> None
     assert np.all(np.abs(estimate - expected) * contribution < 3e-3)
     friction = [k for k, name in enumerate(base.names) if "friction" in name]
     np.testing.assert_allclose(estimate[friction], expected[friction], rtol=0.05)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.3002, 0.4007), (0.3004, 0.3006), (0.0, 0.5), (3.99, 4.0)])
+def test_a_push_lasts_as_long_as_it_is_told_to(begin: float, end: float) -> None:
+    """Not a whole number of steps: when it begins and ends is told to a tenth of one."""
+    times = STEP * np.arange(4000)
+    again = np.array([share_of_step(time, STEP, begin, end, 4.0) for time in times])
+    assert again.sum() * STEP == pytest.approx(end - begin, abs=1e-9)
+    assert share_of_step(times[301] + 4.0, STEP, begin, end, 4.0) == pytest.approx(again[301])
+    once = [share_of_step(time, STEP, begin, end) for time in STEP * np.arange(-1.0, 5000.0)]
+    assert sum(once) * STEP == pytest.approx(end - begin, abs=1e-9)
+
+
+def test_a_push_that_ends_within_a_step_is_another_one() -> None:
+    """The engine asks for the share of the step."""
+    ends = (0.3, 0.3 + 0.5 * STEP / 4.0, 0.3 + STEP / 4.0)
+    shape = {"x": 0.0, "y": 0.6, "z": 0.8, "begin": 0.2, "every_period": 1.0}
+    positions = [
+        truth_and_run("exo_leg", (Planted("external_force", "knee", "library", 40.0, {**shape, "end": end}),))[
+            1
+        ].motion.q
+        for end in ends
+    ]
+    first, second = (np.abs(positions[k + 1] - positions[k]).max() for k in range(2))
+    assert first == pytest.approx(second, rel=0.05)
+    assert first > 1e-6
 
 
 def test_without_its_rotor_coupling_the_plant_is_another_one() -> None:

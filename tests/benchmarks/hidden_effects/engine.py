@@ -182,7 +182,7 @@ def simulate_mujoco(
     wide: list[forms.Wide] = []
     for p in planted:
         forms.bind(p, truth, hooks, wide, step, course)
-    pushes = _pushes(planted, model, series.period, duration)
+    pushes = _pushes(planted, model, series.period, duration, step)
     link_inertia = _link_inertias(stages, model, data, series, iq)
 
     nv = model.nv
@@ -292,8 +292,8 @@ def simulate_mujoco(
                 f_link[i] = f = c if f > c else -c if f < -c else f
                 push -= f
             force[iq[i]] += push
-        for body, vector, on in pushes:
-            data.xfrc_applied[body, :3] = vector if on(t) else 0.0
+        for body, vector, share in pushes:
+            data.xfrc_applied[body, :3] = share(t) * vector
         qpos[:] = x
         qvel[:] = at
         applied[:] = force
@@ -343,7 +343,7 @@ def _structure(
     return tuple(payloads), tuple(flexibilities), tuple(couplings)
 
 
-def _pushes(planted, model, period, duration):  # type: ignore[no-untyped-def]
+def _pushes(planted, model, period, duration, step):  # type: ignore[no-untyped-def]
     pushes = []
     for p in planted:
         if p.effect != "external_force":
@@ -351,12 +351,24 @@ def _pushes(planted, model, period, duration):  # type: ignore[no-untyped-def]
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, p.joint)
         vector = p.size * np.array([p.shape["x"], p.shape["y"], p.shape["z"]])
         if p.shape["every_period"] > 0.5:
-            begin, end = p.shape["begin"], p.shape["end"]
-            pushes.append((body, vector, lambda t, b=begin, e=end: b <= (t / period) % 1.0 < e))
+            begin, end, repeats = p.shape["begin"] * period, p.shape["end"] * period, period
         else:
-            begin, end = p.shape["begin"] * duration, p.shape["begin"] * duration + p.shape["length"]
-            pushes.append((body, vector, lambda t, b=begin, e=end: b <= t < e))
+            begin = p.shape["begin"] * duration
+            end, repeats = begin + p.shape["length"], np.inf
+        pushes.append((body, vector, lambda t, b=begin, e=end, r=repeats: share_of_step(t, step, b, e, r)))
     return pushes
+
+
+def share_of_step(time: float, step: float, begin: float, end: float, period: float = np.inf) -> float:
+    """Share of the step around a time in which a push from begin to end [s] acts, again in every period.
+
+    What a step of `time` does to a velocity is done between half a step before it and half a step after it.
+    """
+    whole = 0.0
+    for again in (-period, 0.0, period) if np.isfinite(period) else (0.0,):
+        at = (time % period if np.isfinite(period) else time) + again
+        whole += max(min(at + 0.5 * step, end) - max(at - 0.5 * step, begin), 0.0)
+    return whole / step
 
 
 def _motor_inertias(stages, model, data, series, iq, it, gear, elastic):  # type: ignore[no-untyped-def]
