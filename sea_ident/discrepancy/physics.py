@@ -13,6 +13,7 @@ from sea_ident.discrepancy.noise import NoiseFloor
 from sea_ident.effects import Effect
 from sea_ident.effects.asymmetric_spring import AsymmetricSpring
 from sea_ident.effects.coulomb_friction import CoulombFriction
+from sea_ident.effects.encoder_offset import EncoderOffset
 from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from sea_ident.effects.presliding_friction import PreslidingFriction
@@ -20,10 +21,14 @@ from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_stiffening import CUBIC, SpringStiffening
 from sea_ident.effects.stribeck_friction import StribeckFriction
 from sea_ident.effects.viscous_friction import ViscousFriction
+from sea_ident.robot import SeriesElasticActuator
 
 LARGEST_OF_A_SENSOR = 20.0
 """Times the torque that an error of a sensor may change it by: more it does only through a spring that hardly moves,
 whose stiffness comes out as anything [-]."""
+
+ABOUT = 2.0
+"""Times as stiff as it is described, or as soft, that a spring may be to be that one [-]."""
 
 LARGEST_TIMES_TORQUE = 1.5
 """No effect is larger than this many times the torque of the motor (rms)."""
@@ -200,6 +205,8 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
     position %= len(fit.effects)
     effect = fit.effects[position]
     columns, values = effect.columns(bench.robot), fit.values[_own(bench, fit, position)]
+    if isinstance(effect, EncoderOffset) and _as_stiff_as_described(bench, fit, effect):
+        return True
     if isinstance(effect, MotorEncoderOffset):
         # one that counts from where it was switched on is off by anything; what is left is a spring, or it is not
         return fit.parameters.get(f"{effect.joint}.{SPRING_LAW[0]}", 0.0) > 0.0
@@ -215,6 +222,15 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
         return True  # terms of one law cancel in part, and what they come to is asked above
     total = np.sqrt(np.sum(np.abs(bench.column_spectra(effect, fit.effects) @ values) ** 2, axis=0))
     return not np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms)
+
+
+def _as_stiff_as_described(bench: Bench, fit: Fit, effect: EncoderOffset) -> bool:
+    """Whether the spring of its joint is about the one that is described: then its zero may be off by anything."""
+    actuator = bench.robot.joints[effect.required_index(bench.robot)].actuator
+    if not isinstance(actuator, SeriesElasticActuator) or actuator.stiffness is None:
+        return False
+    share = fit.parameters.get(f"{effect.joint}.{SPRING_LAW[0]}", 0.0) / actuator.stiffness
+    return 1.0 / ABOUT < share < ABOUT
 
 
 def _wrong_signs(bench: Bench, fit: Fit, position: int) -> IntArray:

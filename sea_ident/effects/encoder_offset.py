@@ -9,7 +9,6 @@ from sea_ident.effects.base import Shape
 from sea_ident.effects.offset import Offset
 from sea_ident.robot import Robot
 
-
 USUAL = 0.5
 """An offset is looked for up to here, ... [rad]"""
 

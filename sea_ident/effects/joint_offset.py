@@ -16,7 +16,7 @@ class JointOffset(Offset):
     """Both encoders of a joint with a spring show its angle + offset.
 
     What lies behind the joint is turned. The bodies of the last joint are turned with it and are free; what the first
-    one does is done by `base_tilt`, for it turns gravity and nothing else.
+    one does is done by `base_tilt`, for it turns gravity and nothing else, unless another chain feels the same gravity.
     """
 
     name: ClassVar[str] = "joint_offset"
@@ -25,12 +25,13 @@ class JointOffset(Offset):
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple["JointOffset", ...]:
-        """At every joint with a spring that has a joint before it and one behind it."""
+        """At every joint with a spring that has a joint before it, or another one beside it, and one behind it."""
         parents = robot.parents
+        alone = sum(before < 0 for before in parents) == 1
         return tuple(
             cls(joint=joint.name)
             for i, joint in enumerate(robot.joints)
-            if joint.elastic and parents[i] >= 0 and i in parents
+            if joint.elastic and i in parents and not (alone and parents[i] < 0)
         )
 
     def shown(self, robot: Robot) -> tuple[str, ...]:

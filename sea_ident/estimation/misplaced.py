@@ -19,7 +19,10 @@ EQUATIONS = 900
 """Equations that are looked at, of all joints together."""
 
 LARGE = 0.01
-"""Share of the power of the torque, the mean of the joints, from which on what is left asks for a reason [-]."""
+"""Share of the power of the torque, the mean of the joints, from which on what is left asks for a reason [-], ..."""
+
+SMALL = 1e-3
+"""... and this where chains that are alike may have changed places, or the bodies as described pull the other way."""
 
 BETTER = 0.1
 """What is left with the columns put right, over what was left, up to which they were wrong [-]."""
@@ -109,10 +112,14 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     own = np.arange(robot.n)
     plain = np.ones(robot.n)
     before, _ = tried(_Order(own, own, own, plain, plain, ""))
-    if before < LARGE:
+    feels = _feels_gravity(robot, motion)
+    # bodies that are free and pulled the other way are negative ones to a model, which leaves little
+    upside_down = feels and _weight(robot, motion, torque, robot.gravity)[0] < -1.0 / HEAVIER
+    if before < SMALL:
         return None
-    mountings = _mountings(robot) if _feels_gravity(robot, motion) else ()
-    orders = (*_orders(robot, "current" if by_current else "tau_motor"), *mountings)
+    kind = "current" if by_current else "tau_motor"
+    mountings = _mountings(robot) if feels and (upside_down or before >= LARGE) else ()
+    orders = (*_chains_exchanged(robot, kind), *mountings, *(_orders(robot, kind) if before >= LARGE else ()))
     found = [(*tried(order), order) for order in orders]
     # bodies that are free may have any weight, and as they are described about theirs
     weights = [None if o.gravity is None else _weight(robot, motion, torque, o.gravity) for _, _, o in found]
@@ -177,6 +184,26 @@ def _orders(robot: Robot, torque: str) -> Iterator[_Order]:
         yield _Order(own, own, own, turned, turned, _reversed((*positions, torque), name))
 
 
+def _chains_exchanged(robot: Robot, torque: str) -> Iterator[_Order]:
+    """Chains that changed places as a whole: as alike as legs are, they leave little of the torque as others."""
+    own, plain = np.arange(robot.n), np.ones(robot.n)
+    elastic = set(robot.elastic_indices.tolist())
+    for one, two in _alike_chains(robot):
+        other = own.copy()
+        other[[*one, *two]] = [*two, *one]
+        kinds = {i: (("q", "theta") if i in elastic else ("q",)) for i in (*one, *two)}
+        pairs = [
+            (kind, robot.joint_names[a], robot.joint_names[b])
+            for i, j in zip(one, two, strict=True)
+            for a, b in ((i, j), (j, i))
+            for kind in (*kinds[i], torque)
+        ]
+        chains = " and ".join(", ".join(robot.joint_names[i] for i in chain) for chain in (one, two))
+        yield _Order(
+            other, other, other, plain, plain, f"all columns of the chains {chains} look exchanged. {_named(pairs)}"
+        )
+
+
 def _mountings(robot: Robot) -> Iterator[_Order]:
     """Gravity along the edges, the diagonals of the sides and those of the whole of a cube around the root link."""
     own, plain = np.arange(robot.n), np.ones(robot.n)
@@ -196,8 +223,30 @@ def _mountings(robot: Robot) -> Iterator[_Order]:
 
 
 def _exchanged(what: str, kinds: tuple[str, ...], a: str, b: str) -> str:
-    names = ", ".join(f"'{kind}_{x}={kind}_{y}'" for kind in kinds for x, y in ((a, b), (b, a)))
-    return f"{what} of {a!r} and {b!r} look exchanged. Name them the other way: ColumnSource, or --column with {names}"
+    pairs = [(kind, x, y) for kind in kinds for x, y in ((a, b), (b, a))]
+    return f"{what} of {a!r} and {b!r} look exchanged. {_named(pairs)}"
+
+
+def _named(pairs: Sequence[tuple[str, str, str]]) -> str:
+    """What to do about columns of a kind that stand under the name of a joint and belong to another."""
+    names = ", ".join(f"'{kind}_{a}={kind}_{b}'" for kind, a, b in pairs)
+    return f"Name them the other way: ColumnSource, or --column with {names}"
+
+
+def _alike_chains(robot: Robot) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Pairs of chains of two joints or more that begin at one place, as the legs of a robot do, joint by joint."""
+    parents, elastic = robot.parents, set(robot.elastic_indices.tolist())
+
+    def chain(i: int) -> tuple[int, ...]:
+        """The joints from one on, as long as none has two behind it."""
+        behind = [k for k, before in enumerate(parents) if before == i]
+        return (i, *chain(behind[0])) if len(behind) == 1 else (i,)
+
+    for i, j in combinations(range(robot.n), 2):
+        one, two = chain(i), chain(j)
+        same = [k in elastic for k in one] == [k in elastic for k in two]
+        if parents[i] == parents[j] and len(one) > 1 and same:
+            yield one, two
 
 
 def _reversed(kinds: tuple[str, ...], joint: str) -> str:

@@ -1,7 +1,7 @@
 """Whether a spring fits badly because the encoders on its two sides have different zeros."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from sea_ident.motion import Motion
 
 TAKES = 0.3
 """Residual with zeros of their own, over that without, up to which they are the reason [-]."""
+
+BENT = 5.0
+"""Times the largest torque of its motor that a spring of the described stiffness would carry in the mean, from which on
+nothing but different zeros bends it so [-]."""
 
 EXPLAINS = 0.3
 """Share of the change of the torque of a spring that its law may leave then [-]."""
@@ -46,7 +50,11 @@ def other_zeros(observations: Observations, values: FloatArray, springs: Sequenc
         One for each such spring; none where the difference was fitted already.
     """
     doubted = [s for s in springs if s.zero == 0.0 and s.verdict is not Verdict.CIRCULAR and not s.terms]
-    doubted = [s for s in doubted if s.doubt() is not None or s.stiffness < 0.0]
+    doubted = [
+        s
+        for s in doubted
+        if s.doubt() is not None or s.stiffness < 0.0 or _beyond_its_motor(observations, s.joint) is not None
+    ]
     return [zero.text for zero in _zeros_of(observations, values, [s.joint for s in doubted])]
 
 
@@ -79,6 +87,10 @@ def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[s
         joint = robot.index(name)
         tau = torque[:, robot.elastic_indices.tolist().index(joint)]
         zero = fit_zero(motion, joint, tau)
+        bent = _beyond_its_motor(observations, name)
+        if bent is not None:
+            found.append(bent if abs(zero - bent.zero) > 0.5 * abs(bent.zero) else replace(bent, zero=zero))
+            continue
         (law, left), (without, whole) = (_law(motion, joint, tau, at) for at in (zero, 0.0))
         # a spring that is none may fit as well
         most = TAKES if without[0] > 0.0 else 1.0
@@ -93,6 +105,29 @@ def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[s
         )
         found.append(OtherZero(name, zero, text))
     return found
+
+
+def _beyond_its_motor(observations: Observations, name: str) -> OtherZero | None:
+    """A spring of described stiffness that would carry more in the mean than its motor ever gives, None if it is not.
+
+    Another zero of a link encoder moves all that lies behind it, and a model without leaves nothing by which the law of
+    the spring could be told.
+    """
+    robot, processed = observations.robot, observations.processed
+    joint, stiffness = robot.index(name), robot.spring(name).stiffness
+    if stiffness is None:
+        return None
+    apart, most = float(np.mean(processed.motion.deflection[:, joint])), np.abs(processed.tau_motor[:, joint]).max()
+    if stiffness * abs(apart) <= BENT * most:
+        return None
+    unit, torque = robot.joints[joint].position_unit, robot.joints[joint].torque_unit
+    text = (
+        f"spring of {name}: theta_{name} and q_{name} are {apart:.4g} {unit} apart in the mean, for which a spring of "
+        f"{stiffness:.4g} {torque}/{unit}, as it is described, takes {stiffness * abs(apart):.4g} {torque}, and the "
+        f"motor gives {most:.3g} at most: their zeros differ. Have the difference fitted (unknown_zero, on the command "
+        f"line --unknown-zero {name}), or correct the zero of one encoder"
+    )
+    return OtherZero(name, apart, text)
 
 
 def _law(motion: Motion, joint: int, tau: FloatArray, zero: float) -> tuple[FloatArray, float]:

@@ -35,20 +35,28 @@ def test_a_spring_with_dry_friction_is_one_where_it_takes_energy_out(nothing_mis
     assert dissipates(bench, effect, np.eye(2)[element]) == (taken > 0.01)
 
 
+@pytest.mark.parametrize(("stiffer", "always"), [(1.0, True), (3.0, False)])
 @pytest.mark.parametrize(("times", "possible_one"), [(0.9, True), (1.1, False)])
+@pytest.mark.parametrize(
+    ("name", "amount", "zero"), [("encoder_offset", "offset", True), ("encoder_eccentricity", "sine", False)]
+)
 def test_an_error_of_an_encoder_does_not_change_the_torque_by_many_times_what_there_is(
-    nothing_missing, times, possible_one
+    nothing_missing, name, amount, zero, times, possible_one, stiffer, always
 ):
-    """It does where a spring hardly moves, and its stiffness comes out as anything: then it explains whatever is."""
-    bench, start = nothing_missing
+    """It does where a spring hardly moves, and its stiffness comes out as anything: then it explains whatever is.
 
-    def with_offset(offset):
-        effects = (*start.fit.effects, make_effect("encoder_offset", "hip", offset=offset))
-        return bench.predicted(effects, start.fit.parameters)
+    The zero of an encoder may be off by anything where the spring is about the one that is described.
+    """
+    bench, start = nothing_missing
+    parameters = {**start.fit.parameters, "hip.spring_stiffness": stiffer * bench.robot.spring("hip").stiffness}
+
+    def with_error(size):
+        effects = (*start.fit.effects, make_effect(name, "hip", **{amount: size}))
+        return bench.predicted(effects, parameters)
 
     size = times * LARGEST_OF_A_SENSOR
-    offset = brentq(lambda value: own_torque(bench, with_offset(value), -1) - size, 1e-3, 10.0)
-    assert physical(bench, with_offset(offset), -1) == possible_one
+    error = brentq(lambda value: own_torque(bench, with_error(value), -1) - size, 1e-3, 10.0)
+    assert physical(bench, with_error(error), -1) == (possible_one or (zero and always))
 
 
 def test_a_spring_that_takes_next_to_no_energy_out_is_not_accepted(nothing_missing):
