@@ -38,6 +38,7 @@ from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed, unnamed
 from sea_ident.discrepancy.unrepeated import diagnose_pushed, diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
+from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.estimation import Model
@@ -45,6 +46,7 @@ from sea_ident.estimation.observations import Observations
 from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.estimation.spring_zero import zeros_apart
 from sea_ident.estimation.torque_units import other_torque_units
+from sea_ident.estimation.turned_zeros import turned_zeros
 from sea_ident.estimation.unknown_zeros import unknown_zeros, with_its_zeros, with_zeros
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.one_thread import one_thread
@@ -166,7 +168,11 @@ def _diagnosed(
     elif data.periods < FEWEST_TO_SEARCH or wrong or notes.doubtful:
         found = unsearched(bench, changing)
     else:
-        found = searched_with_possible_springs(bench, changing, tell, {other.joint: other.zero for other in apart})
+        zeros = (
+            *turned_zeros(robot, model.effects, as_identified),
+            *(MotorEncoderOffset(other.joint, offset=other.zero) for other in apart),
+        )
+        found = searched_with_possible_springs(bench, changing, tell, zeros)
     bench, confirmed, trends = found.bench, found.confirmed, found.trends
     tell("looking for alternatives", 0.6)
     alternatives: Alternatives = {}

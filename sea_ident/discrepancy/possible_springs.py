@@ -7,7 +7,7 @@ They are searched with another zero of each motor encoder, and so are springs wh
 zero that is far off leaves so little of such a spring that nothing in it promises anything.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
+from sea_ident.effects.offset import Offset
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.effects.spring_stiffening import SpringStiffening
 from sea_ident.robot import Robot
@@ -50,22 +51,21 @@ def with_fitted_zeros(bench: Bench, joints: Collection[str]) -> Selection:
     fit = bench.fit((*start.fit.effects, *constants), None, tangents=False)
     values = settle_again(bench, fit).fit.parameters
     zeros = {j: -values[f"{j}.spring_offset"] / values[f"{j}.spring_stiffness"] for j in joints}
-    return with_zeros_apart(bench, zeros, start)
+    return with_zeros(bench, [MotorEncoderOffset(joint, offset=zero) for joint, zero in sorted(zeros.items())], start)
 
 
-def with_zeros_apart(bench: Bench, zeros: Mapping[str, float], start: Settled | None = None) -> Selection:
-    """A model with other zeros of some motor encoders, as if these had been found.
+def with_zeros(bench: Bench, zeros: Sequence[Offset], start: Settled | None = None) -> Selection:
+    """A model with other zeros, as if these had been found.
 
     Args:
         bench: the recording.
-        zeros: what theta shows where q is zero and the spring carries nothing, by joint [rad] or [m].
+        zeros: about as large as they are.
         start: the model without, settled, where that was done already.
     """
     start = settle(bench, bench.effects) if start is None else start
-    added = [MotorEncoderOffset(joint, offset=zero) for joint, zero in sorted(zeros.items())]
-    fit = bench.fit((*start.fit.effects, *added), None, tangents=False)
+    fit = bench.fit((*start.fit.effects, *zeros), None, tangents=False)
     final = settle_again(bench, settle_again(bench, fit).fit)
-    return Selection(start, final, len(added), (0.0,) * len(added))
+    return Selection(start, final, len(zeros), (0.0,) * len(zeros))
 
 
 def left_without_cubic(robot: Robot, stiffness: Mapping[str, float]) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What the mean of the periods lacks: with springs that can be, beyond steps of encoders, and less what drifts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from sea_ident.discrepancy import words
@@ -15,13 +15,14 @@ from sea_ident.discrepancy.possible_springs import (
     impossible_springs,
     left_without_cubic,
     with_fitted_zeros,
-    with_zeros_apart,
+    with_zeros,
     without_cubic,
 )
 from sea_ident.discrepancy.search import Selection, search, still_needed
 from sea_ident.discrepancy.sensor_limits import steps_cover
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.effects.offset import Offset
 
 Progress = Callable[[str, float], None]
 
@@ -41,18 +42,16 @@ def compared(bench: Bench, confirmed: Confirmed, changing: Changing, notes: tupl
     return Found(bench, confirmed, changing.compared(confirmed.bench, confirmed.final.fit), notes)
 
 
-def searched_with_possible_springs(
-    bench: Bench, changing: Changing, tell: Progress, apart: Mapping[str, float]
-) -> Found:
+def searched_with_possible_springs(bench: Bench, changing: Changing, tell: Progress, zeros: Sequence[Offset]) -> Found:
     """Search, and once more without the cubic terms of springs that are impossible with what was found.
 
     Args:
         bench: the recording.
         changing: what changes from period to period.
         tell: progress.
-        apart: differences of zeros that explain the misfit of springs, by joint [rad] or [m].
+        zeros: what is plain before anything is searched, about as large as it is.
     """
-    begun = with_zeros_apart(bench, apart) if apart else None
+    begun = with_zeros(bench, zeros) if zeros else None
     found = _searched_beyond_steps(bench, changing, tell, begun)
     impossible = impossible_springs(bench, found.confirmed.final.fit)
     if not impossible:

@@ -4,15 +4,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident.effects.base import Shape
-from sea_ident.effects.offset import Offset
+from sea_ident.effects.offset import TurnedOffset
 from sea_ident.robot import Robot
-
-LARGEST = 1.5
-"""Conventions differ by a right angle, which is seen at once; what is looked for is less [rad]."""
 
 
 @dataclass(frozen=True)
-class JointOffset(Offset):
+class JointOffset(TurnedOffset):
     """Both encoders of a joint with a spring show its angle + offset.
 
     What lies behind the joint is turned. The bodies of the last joint are turned with it and are free; what the first
@@ -21,7 +18,7 @@ class JointOffset(Offset):
 
     name: ClassVar[str] = "joint_offset"
     source: ClassVar[str] = "Hollerbach, Khalil, Gautier, Model identification, Springer Handbook of Robotics, 2008"
-    amounts: ClassVar[tuple[Shape, ...]] = (Shape("offset", "rad", -LARGEST, LARGEST, logarithmic=False),)
+    amounts: ClassVar[tuple[Shape, ...]] = (Shape("offset", "rad", -1.5, 1.5, logarithmic=False),)
 
     @classmethod
     def instances(cls, robot: Robot) -> tuple["JointOffset", ...]:

@@ -3,8 +3,12 @@
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.effects.base import Shape
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
@@ -40,3 +44,24 @@ class Offset(SignalEffect):
         for values in out.values():
             values[:, i] += by
         return out
+
+
+TURNED = (0.5 * np.pi, -0.5 * np.pi, np.pi)
+"""By so much conventions differ [rad]."""
+
+
+@dataclass(frozen=True)
+class TurnedOffset(Offset):
+    """A zero that may be another posture: it is looked for within the range of its kind, and about right angles."""
+
+    @property
+    def ranges(self) -> tuple[Shape, ...]:
+        """Half a turn to either side where it is beyond the range of its kind."""
+        (usual,) = self.amounts
+        if usual.lower <= self.offset <= usual.upper:
+            return self.amounts
+        return (replace(usual, lower=-float(np.pi), upper=float(np.pi)),)
+
+    def beginnings(self) -> tuple[Self, ...]:
+        """Turned."""
+        return tuple(replace(self, offset=float(offset)) for offset in TURNED)
