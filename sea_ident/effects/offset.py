@@ -49,6 +49,9 @@ class Offset(SignalEffect):
 TURNED = (0.5 * np.pi, -0.5 * np.pi, np.pi)
 """By so much conventions differ [rad]."""
 
+MOST = 4.0
+"""[rad]"""
+
 
 @dataclass(frozen=True)
 class TurnedOffset(Offset):
@@ -56,11 +59,11 @@ class TurnedOffset(Offset):
 
     @property
     def ranges(self) -> tuple[Shape, ...]:
-        """Half a turn to either side where it is beyond the range of its kind."""
+        """Half a turn and some more to either side where it is beyond the range of its kind: half is no end of it."""
         (usual,) = self.amounts
         if usual.lower <= self.offset <= usual.upper:
             return self.amounts
-        return (replace(usual, lower=-float(np.pi), upper=float(np.pi)),)
+        return (replace(usual, lower=-MOST, upper=MOST),)
 
     def beginnings(self) -> tuple[Self, ...]:
         """Turned."""

@@ -16,10 +16,14 @@ LARGE = 0.01
 """Share of the power of the torque, the mean of the joints, from which on what is left asks for a reason [-], ..."""
 
 SMALL = 1e-3
-"""... and this where chains that are alike may have changed places, or the bodies as described pull the other way."""
+"""... and this where chains that are alike may have changed places."""
 
 BETTER = 0.1
 """What is left with the columns put right, over what was left, up to which they were wrong [-]."""
+
+LEAST, LESS = 1e-4, 0.7
+"""`LARGE` and `BETTER` where the bodies as they are described pull the other way: a model whose bodies are free, and
+negative then, leaves little."""
 
 ALIKE = 2.0
 """Times what is left at best up to which directions of gravity are alike [-]."""
@@ -57,9 +61,8 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     motion, torque = trial.motion, trial.torque
     before, _ = trial(as_they_say(robot))
     feels = _feels_gravity(robot, motion)
-    # bodies that are free and pulled the other way are negative ones to a model, which leaves little
     upside_down = feels and _weight(robot, motion, torque, robot.gravity)[0] < -1.0 / HEAVIER
-    if before < SMALL:
+    if before < (LEAST if upside_down else SMALL):
         return None
     kind = "current" if trial.by_current else "tau_motor"
     mountings = _mountings(robot) if feels and (upside_down or before >= LARGE) else ()
@@ -79,7 +82,8 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
         # and of any sign feel gravity from either side
         alike = [each for each in possible if each[1].gravity is not None and each[0] <= ALIKE * after]
         after, order, _ = max(alike, key=lambda each: each[2])
-    if not (after < BETTER * before and after < EXPLAINED):
+    most = LESS if upside_down and order.gravity is not None else BETTER
+    if not (after < most * before and after < EXPLAINED):
         return None
     return (
         f"{processed.source}: {order.text}. With that the model leaves {100.0 * after**0.5:.2g} % of the torque beyond "

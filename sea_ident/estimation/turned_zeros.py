@@ -4,6 +4,9 @@ A search begins at zero and follows a derivative, which near a right angle leads
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
 
 from sea_ident.effects import Effect
 from sea_ident.effects.encoder_offset import EncoderOffset
@@ -17,7 +20,7 @@ LARGE = 5e-4
 """Share of the power of the torque, the mean of the joints, from which on what is left asks for a reason [-]."""
 
 STEP = 0.7
-"""What is left with one more joint turned, over what was left, up to which it may be, ... [-]"""
+"""What is left with one joint turned, or two, over what was left, up to which they may be, ... [-]"""
 
 BETTER = 0.3
 """... and with all of them [-]."""
@@ -38,26 +41,41 @@ def turned_zeros(robot: Robot, effects: Sequence[Effect], processed: ProcessedRe
     if trial is None:
         return ()
     known = {effect.joint for effect in effects if isinstance(effect, TurnedOffset)}
+    turns = [zero for zero in _turned(robot) if zero.joint not in known]
     found: tuple[TurnedOffset, ...] = ()
     before, _ = trial(as_they_say(robot))
     now = before
     while before >= LARGE:
-        done = known | {zero.joint for zero in found}
-        tried = [(trial(as_they_say(robot, (*found, each))), each) for each in _turned(robot) if each.joint not in done]
-        possible = [(left, each) for (left, positive), each in tried if positive]
-        if not possible:
-            break
-        left, best = min(possible, key=lambda pair: pair[0])
+        left, better = _best(trial, found, [(turn,) for turn in turns])
+        if found and now >= LARGE and left > STEP * now:
+            # of several that are turned, one alone may be no step towards all
+            pairs = [pair for pair in combinations(turns, 2) if pair[0].joint != pair[1].joint]
+            left, better = _best(trial, found, pairs)
         if left > STEP * now:
             break
-        now, found = left, (*found, best)
+        now, found = left, better
     return found if now < BETTER * before else ()
+
+
+def _best(
+    trial: Trial, found: Sequence[TurnedOffset], changes: Sequence[tuple[TurnedOffset, ...]]
+) -> tuple[float, tuple[TurnedOffset, ...]]:
+    """What is left with the best of some changes of what was found, and that; infinity where none is possible."""
+    best: tuple[float, tuple[TurnedOffset, ...]] = np.inf, ()
+    for change in changes:
+        joints = {turn.joint for turn in change}
+        zeros = (*(zero for zero in found if zero.joint not in joints), *change)
+        left, positive = trial(as_they_say(trial.robot, zeros))
+        if positive and left < best[0]:
+            best = left, zeros
+    return best
 
 
 def _turned(robot: Robot) -> Iterator[TurnedOffset]:
     """Every joint turned by every angle."""
+    behind = {robot.joint_names[i] for i in robot.parents if i >= 0}  # the last one turns a body that is free
     rigid = [zero for zero in EncoderOffset.instances(robot) if not robot.joints[robot.index(str(zero.joint))].elastic]
     for zero in (*rigid, *JointOffset.instances(robot)):
         joint = robot.joints[robot.index(str(zero.joint))]
-        if isinstance(zero, TurnedOffset) and not joint.prismatic:
+        if isinstance(zero, TurnedOffset) and zero.joint in behind and not joint.prismatic:
             yield from TurnedOffset.beginnings(zero)

@@ -1,7 +1,5 @@
 """A joint whose zero is another posture than the description says, as conventions of makers differ."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -67,12 +65,3 @@ def test_a_turned_zero_of_a_rigid_joint_is_named(arm, offset):
     told = found.missing[0].parameters[0]
     assert told.value == pytest.approx(offset, abs=3.0 * told.std)
     assert told.std < 0.1
-
-
-def test_the_range_of_a_zero_is_half_a_radian_until_it_is_more():
-    """A search takes steps by the range."""
-    near = make_effect("encoder_offset", "knee", offset=0.5)
-    far = replace(near, offset=0.6)
-    assert [(s.lower, s.upper) for s in near.ranges] == [(-0.5, 0.5)]
-    assert [(s.lower, s.upper) for s in far.ranges] == [(-np.pi, np.pi)]
-    assert {round(e.offset, 2) for e in near.beginnings()} >= {1.57, -1.57, 3.14}
