@@ -11,13 +11,17 @@ ONLY_AGAINST_REFERENCE = ("payload",)
 """Effects that a fit of all parameters absorbs altogether."""
 
 
+ONLY_BEFORE_ALL = ("joint_placement",)
+"""Effects that are tried before a search, and not step by step: they would bend to whatever is alike in many joints."""
+
+
 def candidate_effects(bench: Bench, effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Every effect of the library at every place that the model does not have yet, and that shows in the mean."""
     present = {effect_key(effect) for effect in effects}
     present_columns = {column.name for column in bench.labels(effects)}
     found = []
     for name, kind in sorted(effect_classes().items()):
-        if name in ONLY_AGAINST_REFERENCE or issubclass(kind, TrendEffect):
+        if name in (*ONLY_AGAINST_REFERENCE, *ONLY_BEFORE_ALL) or issubclass(kind, TrendEffect):
             continue
         for place in kind.instances(bench.robot):
             effect = _absent(bench, place, effect_key(place) in present, present_columns)

@@ -36,6 +36,7 @@ from sea_ident.discrepancy.next_effect import (
 )
 from sea_ident.discrepancy.one_zero import as_one_zero
 from sea_ident.discrepancy.physics import bends_another, physical, possible
+from sea_ident.discrepancy.placements import with_placements
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again, settled_in_form
 from sea_ident.discrepancy.slips import by_the_first_element
@@ -146,6 +147,12 @@ def search(
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
+        if now is start and begun is None and not ruled_out:
+            now = with_placements(bench, start, candidates)
+            if now is not start:
+                added = [0.0] * (len(now.fit.effects) - len(start.fit.effects))
+                now = _improved(bench, now, len(added), tried, ruled_out)
+                continue
         step = None
         sought = len(added) - _described(bench, now, len(added))
         if sought < MOST_EFFECTS and not _lost(now, before, sought, candidates):

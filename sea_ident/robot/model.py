@@ -268,6 +268,25 @@ class Robot:
         extended.gravity = pin.Motion(given, np.zeros(3))
         return replace(self, model=model, extended_model=extended)
 
+    def with_joint_moved(self, joint: str, way: FloatArray) -> "Robot":
+        """The same robot with a joint, and all that it carries, moved in the frame of the joint before it.
+
+        Args:
+            joint: its name.
+            way: (3,) [m].
+
+        Raises:
+            RobotError: if there is no such joint.
+        """
+        self.index(joint)
+        models = pin.Model(self.model), pin.Model(self.extended_model)
+        for model in models:
+            # a motor turns where its link does: what it weighs there is a part of a link
+            place = model.getJointId(joint)
+            now = model.jointPlacements[place]
+            model.jointPlacements[place] = pin.SE3(now.rotation, now.translation + np.asarray(way, dtype=np.float64))
+        return replace(self, model=models[0], extended_model=models[1])
+
     def with_inertial_parameters(self, inertial: FloatArray, rotor_inertias: FloatArray) -> "Robot":
         """The same robot with other inertial parameters.
 

@@ -52,6 +52,7 @@ NAMES = [
     "encoder_offset",
     "motor_encoder_offset",
     "joint_offset",
+    "joint_placement",
     "encoder_eccentricity",
     "position_delay",
     "torque_delay",
