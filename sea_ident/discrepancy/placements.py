@@ -16,11 +16,17 @@ from sea_ident.effects import Effect
 from sea_ident.effects.joint_placement import JointPlacement
 from sea_ident.side_by_side import side_by_side
 
+PROMISED = 0.95
+"""Share of the excess from which on another effect that promises it is the one that is missing [-]."""
+
 NEARLY_ALL = 0.8
-"""Share of the excess that another effect promises where nothing is tried, and that joints must explain [-]."""
+"""Share of the excess that joints must explain, and more than any other effect promises [-]."""
 
 WORTH = 0.5
 """Share of what is left that one joint more must explain [-]."""
+
+HOPEFUL = 0.3
+"""The same for where they are by a first step."""
 
 ROUNDS = 3
 """Rounds in which the bodies that a joint carries and where it is follow each other."""
@@ -38,7 +44,8 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
         The model, settled.
     """
     excess = start.fit.excess
-    if lack_of_fit(bench, start)[2] >= LACK_LEVEL or (candidates and candidates[0].gain > NEARLY_ALL * excess):
+    promised = candidates[0].gain if candidates else 0.0
+    if promised >= PROMISED * excess or lack_of_fit(bench, start)[2] >= LACK_LEVEL:
         return start
     present = {effect.joint for effect in start.fit.effects if isinstance(effect, JointPlacement)}
     places = [place for place in JointPlacement.instances(bench.robot) if place.joint not in present]
@@ -51,7 +58,7 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
             break
         del places[best]
         now = settle_again(bench, settle_again(bench, new).fit)
-    return now if now.fit.excess < (1.0 - NEARLY_ALL) * excess else start
+    return now if excess - now.fit.excess > max(NEARLY_ALL * excess, promised) else start
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +76,9 @@ class _Moved:
     def __call__(self, place: Effect) -> tuple[float, Solution]:
         """What is left with it, and the model."""
         bench, fit = self.bench, self.now.fit
-        new = bench.fit((*bench.anchored(fit.effects, fit.parameters), place), self.now.noise, start=fit.parameters)
-        for _ in range(ROUNDS):
+        effects = (*bench.anchored(fit.effects, fit.parameters), *bench.anchored((place,), fit.parameters))
+        new = bench.fit(effects, self.now.noise, start=fit.parameters, tangents=False)
+        for _ in range(ROUNDS if fit.statistic - new.statistic > HOPEFUL * fit.excess else 0):
             anchored = bench.anchored(new.effects, new.parameters)
             new = bench.fit(anchored, self.now.noise, start=new.parameters, tangents=False)
         return new.statistic, new.solution

@@ -58,6 +58,9 @@ BEYOND_DOUBT = 0.02
 """... unless it leaves less than this share of the excess without it: no other form is so alike a push that comes and
 goes, and without it nothing else is told [-]."""
 
+MOVED_BEFORE = 3
+"""Effects before which it is asked whether joints are elsewhere."""
+
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
@@ -147,11 +150,11 @@ def search(
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
-        if now is start and begun is None and not ruled_out:
-            now = with_placements(bench, start, candidates)
-            if now is not start:
-                added = [0.0] * (len(now.fit.effects) - len(start.fit.effects))
-                now = _improved(bench, now, len(added), tried, ruled_out)
+        if len(added) < MOVED_BEFORE and not ruled_out:
+            moved = with_placements(bench, now, candidates)
+            if moved is not now:
+                added.extend([0.0] * (len(moved.fit.effects) - len(now.fit.effects)))
+                now = _improved(bench, moved, len(added), tried, ruled_out)
                 continue
         step = None
         sought = len(added) - _described(bench, now, len(added))

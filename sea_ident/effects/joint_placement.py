@@ -12,6 +12,7 @@ from sea_ident.effects.acting import Action
 from sea_ident.effects.base import Anchor, Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
+from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
 ALONG, ACROSS = "along", "across"
@@ -22,6 +23,9 @@ STEP = 0.05
 
 LARGEST = 1.0
 """[m]"""
+
+SAMPLES = 60
+"""Random samples of a motion in which bodies are compared."""
 
 PARALLEL = 1e-6
 """Sine or cosine below which directions are parallel or at right angles [-]."""
@@ -116,7 +120,8 @@ class JointPlacement(Effect):
         """What the ways are."""
         return (
             f"{self.title}: its <origin> in the description is off; {ALONG} counts away from the joint before it, "
-            f"{ACROSS} at right angles to that and to its own axis"
+            f"{ACROSS} at right angles to that and to its own axis. Correct it there and identify again: files that "
+            "are exported do not have it"
         )
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
@@ -124,8 +129,19 @@ class JointPlacement(Effect):
         return lambda state, link, motor: None
 
     def modified(self, robot: Robot, values: FloatArray) -> Robot:
-        """The robot with the joint there."""
-        return self._moved(robot, self._way(robot, np.asarray(values, dtype=np.float64)))
+        """The robot with the joint there, and bodies that need there what those need that it was found with.
+
+        A model knows sums of what its bodies have, for the place that the joint has in its description; how they are
+        shared out does not matter there and does elsewhere.
+        """
+        moved = self._moved(robot, self._way(robot, np.asarray(values, dtype=np.float64)))
+        if not len(self.inertial):
+            return moved
+        q, dq, ddq = np.random.default_rng(1).normal(size=(3, SAMPLES, robot.n))
+        rows = State(moved, Motion.rigid(np.arange(SAMPLES) / 100.0, q, dq, ddq)).body_regressor
+        table, apart = rows.reshape(-1, rows.shape[2]), np.array(self.inertial) - robot.inertial_parameters
+        less = np.linalg.lstsq(table, table @ apart, rcond=1e-9)[0]
+        return moved.with_inertial_parameters(robot.inertial_parameters + less, robot.rotor_inertias())
 
     def _shift(self, robot: Robot, values: FloatArray) -> tuple[float, float]:
         """Along and across, of the values of those that are felt."""

@@ -52,6 +52,31 @@ def test_columns_are_what_the_bodies_need_more(robot):
         )
 
 
+def test_bodies_are_shared_out_as_the_columns_have_it(robot):
+    """A model knows its bodies in sums, which hold where the joint is described to be."""
+    motion, rng = random_motion(robot, 20, 1), np.random.default_rng(5)
+    state = State(robot, motion)
+    # the same sums, otherwise shared out: what no motion shows of the bodies
+    large = State(robot, random_motion(robot, 300, 6)).body_regressor.reshape(300 * robot.n, -1)
+    _, sizes, ways = np.linalg.svd(large, full_matrices=True)
+    unseen = ways[np.sum(sizes > 1e-9 * sizes[0]) :]
+    own = robot.inertial_parameters
+    other = own + 0.02 * np.linalg.norm(own) * rng.normal(size=len(unseen)) @ unseen
+    for place in JointPlacement.instances(robot):
+        values = rng.normal(0.0, 0.1, len(place.columns(robot)))
+        known = dict(zip(robot.inertial_names, other, strict=True))
+        names = [column.name for column in place.columns(robot)]
+        anchored = place.anchored(Anchor(robot, (), {**known, **dict(zip(names, values, strict=True))}))
+        torque = state.body_torque(own) + anchored.evaluate(state).link @ values
+        moved = anchored.modified(robot, values)
+        simulated = State(moved, motion).body_torque(moved.inertial_parameters)
+        np.testing.assert_allclose(simulated, torque, atol=1e-7 * np.abs(torque).max())
+        # which it is not by the bodies as they are
+        as_they_are = State(moved, motion).body_torque(own)
+        if np.abs(as_they_are - torque).max() > 1e-6 * np.abs(torque).max():
+            assert np.abs(moved.inertial_parameters - own).max() > 1e-6
+
+
 def test_what_other_parameters_would_do_has_no_column(robot):
     """And what has one is told apart from all bodies, rotors and frictions."""
     motion = random_motion(robot, 400, 3)
