@@ -66,7 +66,7 @@ def test_beginnings_that_are_worse_than_the_estimate_are_not_followed(rippled, s
     """An offset of a right encoder: from the far ends of its range there is nothing to be learned."""
     bench, _, right = rippled
     offset = make_effect("encoder_offset", "knee")
-    assert len(offset.beginnings()) == 2
+    assert len(offset.beginnings()) == 5
     refitted(bench, right.fit.effects, offset, (), right.noise, right.fit.parameters)
     assert max(steps) < 3.0 * right.fit.statistic
 

@@ -13,24 +13,27 @@ from sea_ident.motion import FourierSeries
 
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 
-HOW = {"harmonics": 5, "starts": 4, "rate": 50.0, "seed": 0, "jobs": 1}
+HOW = {"harmonics": 5, "starts": 4, "rate": 50.0, "jobs": 1}
+SEEDS = (0, 1, 2)
+"""Of few beginnings the best design of one seed is better or worse than that of another, and on another machine is
+another one: what is claimed is claimed of their mean."""
+
 NOISE = 0.2
 SECOND = 3
 """Periods of the second recording; the first has twenty."""
 
 
-@pytest.fixture(scope="module")
-def campaign(leg):
+def campaign(leg, seed):
     """Identifies the second recording of a series, alone and with the first, in which the ankle hardly moved."""
     limits, ankle = leg.limits, np.array([False, False, True])
     held = replace(limits, lower=np.where(ankle, -0.02, limits.lower), upper=np.where(ankle, 0.02, limits.upper))
-    first = design_excitation(leg, limits=held, **HOW).series
+    first = design_excitation(leg, limits=held, seed=seed, **HOW).series
     effects, truths = base_effects(leg), {}
 
-    def recorded(series, periods, seed):
+    def recorded(series, periods, chance):
         key = series.coefficients.tobytes()
         truths.setdefault(key, truth_of(leg, series, samples=1000))
-        return record(leg, truths[key], periods, seed=seed, torque_noise=NOISE, encoder_noise=1e-5)
+        return record(leg, truths[key], periods, seed=chance, torque_noise=NOISE, encoder_noise=1e-5)
 
     before = identify(leg, recorded(first, 20, 1), period=10.0, effects=effects)
 
@@ -39,15 +42,15 @@ def campaign(leg):
         alone = identify(leg, recording, period=10.0, effects=effects)
         return alone, identify(leg, recording, period=10.0, effects=effects, prior=before)
 
-    return first, before, after
+    noise = np.full(3, NOISE / np.sqrt(SECOND))
+    information = information_about(before, reduced_effects(leg))
+    designed = design_excitation(leg, information=information, noise=noise, seed=seed, **HOW).series
+    return first, before, after, after(designed)
 
 
 @pytest.fixture(scope="module")
-def sequential(leg, campaign):
-    _, before, after = campaign
-    noise = np.full(3, NOISE / np.sqrt(SECOND))
-    information = information_about(before, reduced_effects(leg))
-    return after(design_excitation(leg, information=information, noise=noise, **HOW).series)
+def campaigns(leg):
+    return [campaign(leg, seed) for seed in SEEDS]
 
 
 def expected_std(before, alone):
@@ -61,43 +64,45 @@ def expected_std(before, alone):
 WEAK = ("foot.mz", "foot.Iyy", "ankle.viscous_friction", "ankle.coulomb_friction")
 
 
-def test_the_first_recording_says_what_it_does_not_tell(campaign):
-    _, before, _ = campaign
-    known = what_is_known(before)
-    assert known.weakest[0][0] in WEAK
-    assert known.weakest_percent > 20.0
+def test_the_first_recording_says_what_it_does_not_tell(campaigns):
+    for _, before, _, _ in campaigns:
+        known = what_is_known(before)
+        assert known.weakest[0][0] in WEAK
+        assert known.weakest_percent > 20.0
 
 
-def test_the_designed_recording_beats_another_of_the_first(campaign, sequential):
-    first, before, after = campaign
-    repeated, _ = after(first)
-    designed, determinant = expected_std(before, sequential[0])
-    again, usual = expected_std(before, repeated)
-    for name in WEAK:
-        assert designed[name] < again[name] / 2.5
-    assert designed["ankle.viscous_friction"] < again["ankle.viscous_friction"] / 20.0
-    assert determinant > usual + 10.0
+def test_the_designed_recording_beats_another_of_the_first(campaigns):
+    gains = []
+    for first, before, after, (alone, _) in campaigns:
+        designed, determinant = expected_std(before, alone)
+        again, usual = expected_std(before, after(first)[0])
+        assert determinant > usual + 10.0
+        gains.append([again[name] / designed[name] for name in WEAK])
+    mean = dict(zip(WEAK, np.mean(gains, axis=0), strict=True))
+    assert min(mean.values()) > 2.5
+    assert mean["ankle.viscous_friction"] > 20.0
 
 
-def test_the_designed_recording_beats_excitations_that_do_not_know(leg, campaign, sequential):
-    _, before, after = campaign
-    determinant = expected_std(before, sequential[0])[1]
-    for seed in range(2):  # these need not even respect the limits
+def test_the_designed_recording_beats_excitations_that_do_not_know(leg, campaigns):
+    gains = []
+    for seed, (_, before, after, (alone, _)) in zip(SEEDS, campaigns, strict=True):
+        determinant = expected_std(before, alone)[1]
+        # this one need not even respect the limits
         a, b = np.random.default_rng(seed).normal(0.0, 0.25, (2, 3, 5))
-        assert (
-            determinant > expected_std(before, after(FourierSeries(0.1, np.array([0.5, -0.3, 0.4]), a, b))[0])[1] + 1.0
-        )
-    blind, _ = after(design_excitation(leg, **HOW).series)
-    assert determinant > expected_std(before, blind)[1] + 0.2
+        anyhow = FourierSeries(0.1, np.array([0.5, -0.3, 0.4]), a, b)
+        assert determinant > expected_std(before, after(anyhow)[0])[1] + 1.0
+        blind, _ = after(design_excitation(leg, seed=seed, **HOW).series)
+        gains.append(determinant - expected_std(before, blind)[1])
+    assert np.mean(gains) > 0.2
+    assert min(gains) > -0.1
 
 
-def test_the_estimate_from_both_recordings_holds_the_truth(leg, campaign, sequential, truth):
-    _, before, _ = campaign
-    _, joint = sequential
-    exact = joint.base.project(truth.parameters)
-    assert joint.update.changed == ()
-    error = (joint.values - exact) / joint.std
-    assert np.sqrt(np.mean(error**2)) < 1.6
-    for name in WEAK:
-        k = joint.names.index(name)
-        assert joint.std[k] < before.std[k] / 2.0
+def test_the_estimate_from_both_recordings_holds_the_truth(campaigns, truth):
+    less = []
+    for _, before, _, (_, joint) in campaigns:
+        exact = joint.base.project(truth.parameters)
+        assert joint.update.changed == ()
+        error = (joint.values - exact) / joint.std
+        assert np.sqrt(np.mean(error**2)) < 1.6
+        less.append([joint.std[joint.names.index(name)] / before.std[joint.names.index(name)] for name in WEAK])
+    assert np.all(np.mean(less, axis=0) < 0.5)

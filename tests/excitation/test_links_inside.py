@@ -1,5 +1,7 @@
 """Limits hold where springs take the links, or it is said by how much they do not."""
 
+import re
+
 import numpy as np
 import pytest
 from soft_arms import soft_arm
@@ -96,8 +98,11 @@ def test_links_that_sag_are_told_and_kept_where_that_is_asked_for(robot_of, tmp_
 def test_links_that_would_leave_a_limit_far_are_kept_inside():
     """The harmonics stay away from the resonance, but the elbow would be accelerated half as much again."""
     arm = soft_arm(260.0)
-    with pytest.warns(SeaIdentWarning, match=r"go with their motors, .* elbow.acceleration by 1.95 .* stay inside"):
+    with pytest.warns(SeaIdentWarning, match=r"go with their motors, .* stay inside") as told:
         found = design_excitation(arm, **{**SMALL, "harmonics": 4})
+    # by how much hangs on the design, which is another one where numbers are rounded otherwise
+    (beyond,) = re.findall(r"elbow.acceleration by (\S+) rad/s2", str(told[0].message))
+    assert 1.5 < float(beyond) < 3.0
     assert min(*found.margins.values(), *found.link_margins.values()) >= 0.0
     planned = design_excitation(arm, links=LinksAsPlanned(), **{**SMALL, "harmonics": 4})
     assert planned.log_det - 3.0 < found.log_det < planned.log_det
