@@ -87,14 +87,13 @@ def _zeros_of(observations: Observations, values: FloatArray, joints: Sequence[s
         joint = robot.index(name)
         tau = torque[:, robot.elastic_indices.tolist().index(joint)]
         zero = fit_zero(motion, joint, tau)
-        bent = _beyond_its_motor(observations, name)
-        if bent is not None:
-            found.append(bent if abs(zero - bent.zero) > 0.5 * abs(bent.zero) else replace(bent, zero=zero))
-            continue
         (law, left), (without, whole) = (_law(motion, joint, tau, at) for at in (zero, 0.0))
         # a spring that is none may fit as well
         most = TAKES if without[0] > 0.0 else 1.0
         if not (left < min(most * whole, EXPLAINS * float(np.std(tau))) and law[0] > 0.0):
+            bent = _beyond_its_motor(observations, name)
+            if bent is not None:
+                found.append(bent if abs(zero - bent.zero) > 0.5 * abs(bent.zero) else replace(bent, zero=zero))
             continue
         unit = robot.joints[joint].position_unit
         text = (
