@@ -1,5 +1,6 @@
 """Zeros that are other postures, and chains that changed places, on an arm and on a robot with two of them."""
 
+import re
 import warnings
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from estimation.synthetic import record, truth_of
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.effects.joint_offset import JointOffset
+from sea_ident.estimation import identify
 from sea_ident.estimation.misplaced import misplaced_columns
 from sea_ident.estimation.turned_zeros import turned_zeros
 from sea_ident.exceptions import SeaIdentWarning
@@ -141,3 +143,25 @@ def test_the_range_of_a_zero_is_that_of_its_kind_until_it_is_more():
         assert (ranges[most].lower, ranges[most].upper) == (-most, most)
         assert all(ranges[size].upper == -ranges[size].lower > 1.1 * np.pi for size in (most + 0.1, np.pi))
         assert {round(e.offset, 2) for e in make_effect(name, "l2").beginnings()} >= {1.57, -1.57, 3.14}
+
+
+def test_zeros_that_no_motor_could_hold_apart_are_told_whatever_the_model_leaves():
+    """A link encoder far off moves all that lies behind it: nothing fits, and the law of its spring is anything."""
+    two = robot(("l", 0.3), ("r", -0.3), springs=True)
+    a, b = np.random.default_rng(3).normal(0.0, 0.25, (2, two.n, 4))
+    truth = truth_of(two, FourierSeries(0.2, np.linspace(-0.2, 0.3, two.n), a, b), samples=500)
+    recording = record(two, truth, 4, **NOISE)
+    moved = recording.replace_columns({"q_l2": recording.columns["q_l2"] + 1.2})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        right, wrong = (identify(two, each, period=5.0) for each in (recording, moved))
+    assert not any("their zeros differ" in text for text in right.warnings)
+    (said,) = [text for text in wrong.warnings if "their zeros differ" in text]
+    apart = float(re.search(r"theta_l2 and q_l2 are (\S+) rad apart", said)[1])
+    assert apart == pytest.approx(-1.2, abs=0.1)
+    told_of = re.search(r"of (\S+) N m/rad.*takes (\S+) N m, .* gives (\S+) at", said)
+    stiffness, takes, most = map(float, told_of.groups())
+    assert stiffness == two.spring("l2").stiffness
+    assert takes == pytest.approx(stiffness * abs(apart), rel=1e-2)
+    assert most == pytest.approx(abs(recording.columns["tau_motor_l2"]).max(), rel=0.1)
+    assert "--unknown-zero l2" in said
