@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate
 from sea_ident.discrepancy.fit import Solution
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.joint_placement import JointPlacement
@@ -18,6 +17,9 @@ from sea_ident.side_by_side import side_by_side
 
 PROMISED = 0.95
 """Share of the excess from which on another effect that promises it is the one that is missing [-]."""
+
+PLAIN = 10.0
+"""Statistic over degrees of freedom from which on it is asked: less is explained by many ways of several joints [-]."""
 
 NEARLY_ALL = 0.8
 """Share of the excess that joints must explain, and more than any other effect promises [-]."""
@@ -45,7 +47,7 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
     """
     excess = start.fit.excess
     promised = candidates[0].gain if candidates else 0.0
-    if promised >= PROMISED * excess or lack_of_fit(bench, start)[2] >= LACK_LEVEL:
+    if promised >= PROMISED * excess or start.fit.statistic < PLAIN * start.fit.dof:
         return start
     present = {effect.joint for effect in start.fit.effects if isinstance(effect, JointPlacement)}
     places = [place for place in JointPlacement.instances(bench.robot) if place.joint not in present]
