@@ -10,7 +10,6 @@ from sea_ident.effects.drift import TrendEffect
 ONLY_AGAINST_REFERENCE = ("payload",)
 """Effects that a fit of all parameters absorbs altogether."""
 
-
 ONLY_BEFORE_ALL = ("joint_placement",)
 """Effects that are tried before a search, and not step by step: they would bend to whatever is alike in many joints."""
 

@@ -51,11 +51,13 @@ def with_fitted_zeros(bench: Bench, joints: Collection[str]) -> Selection:
     fit = bench.fit((*start.fit.effects, *constants), None, tangents=False)
     values = settle_again(bench, fit).fit.parameters
     zeros = {j: -values[f"{j}.spring_offset"] / values[f"{j}.spring_stiffness"] for j in joints}
-    return with_zeros(bench, [MotorEncoderOffset(joint, offset=zero) for joint, zero in sorted(zeros.items())], start)
+    return begun_with_zeros(
+        bench, [MotorEncoderOffset(joint, offset=zero) for joint, zero in sorted(zeros.items())], start
+    )
 
 
-def with_zeros(bench: Bench, zeros: Sequence[Offset], start: Settled | None = None) -> Selection:
-    """A model with other zeros, as if these had been found.
+def begun_with_zeros(bench: Bench, zeros: Sequence[Offset], start: Settled | None = None) -> Selection:
+    """A model with wrong zeros, as if these had been found: from where a search goes on.
 
     Args:
         bench: the recording.

@@ -153,9 +153,13 @@ def search(
         if len(added) < MOVED_BEFORE and not ruled_out:
             moved = with_placements(bench, now, candidates)
             if moved is not now:
-                added.extend([0.0] * (len(moved.fit.effects) - len(now.fit.effects)))
-                now = _improved(bench, moved, len(added), tried, ruled_out)
-                continue
+                more = len(moved.fit.effects) - len(now.fit.effects)
+                moved = _improved(bench, moved, len(added) + more, tried, ruled_out)
+                if _possible(bench, moved, len(added) + more):
+                    now, before = moved, now
+                    added.extend([0.0] * more)
+                    largest = np.maximum(largest, _largest_changes(bench, now.fit, len(added)))
+                    continue
         step = None
         sought = len(added) - _described(bench, now, len(added))
         if sought < MOST_EFFECTS and not _lost(now, before, sought, candidates):

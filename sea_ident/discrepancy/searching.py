@@ -12,10 +12,10 @@ from sea_ident.discrepancy.conclude import unexplained
 from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
 from sea_ident.discrepancy.lack import remainder_share
 from sea_ident.discrepancy.possible_springs import (
+    begun_with_zeros,
     impossible_springs,
     left_without_cubic,
     with_fitted_zeros,
-    with_zeros,
     without_cubic,
 )
 from sea_ident.discrepancy.search import Selection, search, still_needed
@@ -51,7 +51,7 @@ def searched_with_possible_springs(bench: Bench, changing: Changing, tell: Progr
         tell: progress.
         zeros: what is plain before anything is searched, about as large as it is.
     """
-    begun = with_zeros(bench, zeros) if zeros else None
+    begun = begun_with_zeros(bench, zeros) if zeros else None
     found = _searched_beyond_steps(bench, changing, tell, begun)
     impossible = impossible_springs(bench, found.confirmed.final.fit)
     if not impossible:

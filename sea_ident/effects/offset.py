@@ -13,6 +13,12 @@ from sea_ident.effects.signal import SignalEffect
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
+TURNED = (0.5 * np.pi, -0.5 * np.pi, np.pi)
+"""By so much conventions differ [rad]."""
+
+WIDEST = 4.0
+"""Half a turn and some more: half a turn is no end of a range [rad]."""
+
 
 @dataclass(frozen=True)
 class Offset(SignalEffect):
@@ -46,24 +52,17 @@ class Offset(SignalEffect):
         return out
 
 
-TURNED = (0.5 * np.pi, -0.5 * np.pi, np.pi)
-"""By so much conventions differ [rad]."""
-
-MOST = 4.0
-"""[rad]"""
-
-
 @dataclass(frozen=True)
 class TurnedOffset(Offset):
     """A zero that may be another posture: it is looked for within the range of its kind, and about right angles."""
 
     @property
     def ranges(self) -> tuple[Shape, ...]:
-        """Half a turn and some more to either side where it is beyond the range of its kind: half is no end of it."""
+        """Any angle where it is beyond the range of its kind."""
         (usual,) = self.amounts
         if usual.lower <= self.offset <= usual.upper:
             return self.amounts
-        return (replace(usual, lower=-MOST, upper=MOST),)
+        return (replace(usual, lower=-WIDEST, upper=WIDEST),)
 
     def beginnings(self) -> tuple[Self, ...]:
         """Turned."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
+from sea_ident.effects.joint_placement import JointPlacement
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.estimation import Model, physical_parameters
 from sea_ident.exceptions import ExportError, OutputError, SeaIdentWarning
@@ -79,9 +80,17 @@ def model_values(model: Model) -> tuple[ExportValues, list[str], list[str]]:
         (notes if physical.within_uncertainty else warnings).append(physical.verdict())
     beside = (*model.spring_effects, *(trend.effect for trend in model.trends))
     inside = [column.name for effect in beside for column in effect.columns(model.robot)]
+    moved = [effect for effect in model.effects if isinstance(effect, JointPlacement)]
+    ways = {column.name for effect in moved for column in effect.columns(model.robot)}
+    warnings += [
+        f"{effect.title} is not in the file, whose bodies go with it: correct the <origin> of the joint in the "
+        "description, identify again and export that model"
+        for effect in moved
+    ]
     # what errs in a sensor has amounts and no columns
     sensed = [effect.parameter_name() for effect in model.effects if isinstance(effect, SignalEffect)]
-    return replace(values, joints=tuple(joints), left_out=(*values.left_out, *inside, *sensed)), notes, warnings
+    left_out = (*(name for name in values.left_out if name not in ways), *inside, *sensed)
+    return replace(values, joints=tuple(joints), left_out=left_out), notes, warnings
 
 
 def export_urdf(model: Model, path: str | Path) -> Export:

@@ -281,7 +281,7 @@ class Robot:
         self.index(joint)
         models = pin.Model(self.model), pin.Model(self.extended_model)
         for model in models:
-            # a motor turns where its link does: what it weighs there is a part of a link
+            # rotors stay: they have an inertia about their axis and no mass, so that where they are does not matter
             place = model.getJointId(joint)
             now = model.jointPlacements[place]
             model.jointPlacements[place] = pin.SE3(now.rotation, now.translation + np.asarray(way, dtype=np.float64))

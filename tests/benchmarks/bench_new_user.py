@@ -1,6 +1,6 @@
 """A robot, a simulator and forms of friction that the project does not have, through files and the command line alone.
 
-    python tests/benchmarks/bench_new_user.py [CASE ...]
+    python -m tests.benchmarks.bench_new_user [CASE ...]
 
 The arm has three elastic joints whose axes and base are tilted; its true masses, springs and frictions are not those of
 its description. It is stepped by Pinocchio's articulated-body algorithm with every rotor as a body of its own, in
@@ -10,12 +10,7 @@ which `sea-ident identify` and `sea-ident diagnose` read. Printed per case: verd
 parameters, the truth, and the seconds of the diagnosis.
 """
 
-import csv
 import json
-import subprocess
-import sys
-import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +18,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+
+from tests.benchmarks.through_files import in_words, run_cases, sea_ident, write
 
 Array = NDArray[np.float64]
 Torques = tuple[Array, Array, Array]
@@ -255,32 +252,31 @@ def simulated(case: Case, rng: np.random.Generator, periods: int, amplitude: flo
     return np.array(rows)
 
 
-def write(path: Path, exact: Array, rng: np.random.Generator) -> None:
-    """Write what the sensors show of that."""
+def shown(exact: Array, rng: np.random.Generator) -> dict[str, Array]:
+    """What the sensors show of that."""
     q, theta, current = exact[:, :3], exact[:, 3:6], exact[:, 6:]
     fine = ENCODER / 50.0
     q = ENCODER * np.round((q + 0.3 * ENCODER * rng.normal(size=q.shape)) / ENCODER)
     theta = fine * np.round((theta + 0.5 * fine * rng.normal(size=q.shape)) / fine)
     current = current + CURRENT_NOISE * rng.normal(size=q.shape)
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time", *(f"{kind}_{joint}" for kind in ("q", "theta", "current") for joint in JOINTS)])
-        writer.writerows(np.column_stack([np.arange(len(q)) / RATE, q, theta, current]).tolist())
+    table = {"time": np.arange(len(q)) / RATE}
+    for kind, values in (("q", q), ("theta", theta), ("current", current)):
+        table |= {f"{kind}_{joint}": values[:, k] for k, joint in enumerate(JOINTS)}
+    return table
 
 
 def record(path: Path, case: Case, seed: int, periods: int, amplitude: float) -> None:
     """Simulate, and write what the sensors show."""
     rng = np.random.default_rng(seed)
-    write(path, simulated(case, rng, periods, amplitude), rng)
+    write(path, shown(simulated(case, rng, periods, amplitude), rng))
 
 
 def command(*arguments: str | Path) -> float:
     """Run `sea-ident`; the seconds that it took."""
-    begin = time.perf_counter()
-    done = subprocess.run(["sea-ident", *map(str, arguments)], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"sea-ident {arguments[0]} failed:\n{done.stderr}")
-    return time.perf_counter() - begin
+    ran = sea_ident(*arguments)
+    if ran.refused:
+        raise SystemExit(f"sea-ident {arguments[0]} failed:\n{ran.refused}")
+    return ran.seconds
 
 
 def diagnose(name: str, case: Case, folder: Path) -> bool:
@@ -301,29 +297,11 @@ def diagnose(name: str, case: Case, folder: Path) -> bool:
     found = json.loads(out.read_text())
     named = [(m["effect"], m["joint"]) for m in found["missing"]]
     right = sorted(named, key=str) == sorted(case.names, key=str)
-    said = []
-    for m in found["missing"]:
-        values = ", ".join(f"{p['name']} {p['value']:.4g} +- {p['std']:.2g} {p['unit']}" for p in m["parameters"][:3])
-        where = m["effect"] if m["joint"] is None else f"{m['effect']} at {m['joint']}"
-        said.append(f"{where}: {values}" + (" (or others)" if m["alternatives"] else ""))
     print(f"{'right' if right else 'WRONG':6}{name:10} {seconds:5.1f} s  {found['verdict']:24} truth: {case.truth}")
-    for line in said:
-        print(f"{'':27}{line}")
+    for missing in found["missing"]:
+        print(f"{'':27}{in_words(missing)}")
     return right
 
 
-def main() -> None:
-    """All cases, or those that are asked for."""
-    names = sys.argv[1:] or list(CASES)
-    unknown = [name for name in names if name not in CASES]
-    if unknown:
-        raise SystemExit(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
-    right = 0
-    for name in names:
-        with tempfile.TemporaryDirectory() as folder:
-            right += diagnose(name, CASES[name], Path(folder))
-    print(f"{right} of {len(names)} right")
-
-
 if __name__ == "__main__":
-    main()
+    run_cases(CASES, diagnose)

@@ -21,6 +21,7 @@ import numpy as np
 from sea_ident import Model, diagnose, identify, load_robot, read_recording
 from sea_ident.exceptions import SeaIdentWarning
 from tests.benchmarks import bench_new_user as bench
+from tests.benchmarks.through_files import write
 
 CASE = bench.CASES["asymmetry"]
 
@@ -51,7 +52,7 @@ def main() -> None:
         urdf.write_text(bench.URDF)
         robot = load_robot(urdf)
         for number in range(arguments.recordings):
-            bench.write(file, exact, np.random.default_rng((arguments.seed, number)))
+            write(file, bench.shown(exact, np.random.default_rng((arguments.seed, number))))
             recording = read_recording(file)
             model = identify(robot, recording, period=bench.PERIOD)
             found = diagnose(model, recording)

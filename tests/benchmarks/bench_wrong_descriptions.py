@@ -1,8 +1,8 @@
 """A rigid arm and a robot with two chains, described or recorded wrongly: is it told what is wrong?
 
-    python tests/benchmarks/bench_wrong_descriptions.py [NAME ...]
+    python -m tests.benchmarks.bench_wrong_descriptions [NAME ...]
 
-Two robots that the project does not have: six rigid joints whose axes point anywhere, and two alike chains of two
+Two robots that the project does not have: six rigid joints with tilted axes, and two alike chains of two
 joints with springs and a rigid one. Their true bodies, rotors, springs and frictions are not those of their
 description. A motion is given, the torque follows from Pinocchio's recursive Newton-Euler algorithm, the springs are
 inverted, and what sensors show is written to CSV files. Then something is wrong, in the files or in the URDF, and
@@ -11,12 +11,7 @@ are wrong, or where nothing is named and the warnings say what to do. Printed pe
 and the seconds.
 """
 
-import csv
 import json
-import subprocess
-import sys
-import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +19,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+
+from tests.benchmarks.through_files import in_words, run_cases, sea_ident, write
 
 Array = NDArray[np.float64]
 Table = dict[str, Array]
@@ -41,6 +38,7 @@ ENCODER = 2.0 * np.pi / 2**17
 CURRENT_NOISE = 0.02
 """Standard deviation [A]."""
 
+SURE = ("named", "named_with_remainder")
 RIGHT = 0.5 * np.pi
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 ARM = tuple(f"a{k}" for k in range(1, 7))
@@ -298,21 +296,6 @@ CASES: Mapping[str, Case] = {
 }
 
 
-def write(file: Path, table: Table) -> None:
-    """A CSV file."""
-    with file.open("w", newline="") as opened:
-        writer = csv.writer(opened)
-        writer.writerow(table)
-        writer.writerows(np.column_stack(list(table.values())).tolist())
-
-
-def run(*arguments: str | Path) -> tuple[str, float]:
-    """Run `sea-ident`: what it wrote to standard error where it refused, and the seconds that it took."""
-    begin = time.perf_counter()
-    done = subprocess.run(["sea-ident", *map(str, arguments)], capture_output=True, text=True, check=False)
-    return (done.stderr if done.returncode else ""), time.perf_counter() - begin
-
-
 def told(name: str, case: Case, folder: Path) -> bool:
     """Record, identify and diagnose one case; whether what is wrong is told."""
     urdf, model, out = (folder / file for file in ("robot.urdf", "model.json", "diagnosis.json"))
@@ -323,37 +306,24 @@ def told(name: str, case: Case, folder: Path) -> bool:
     files = folder / "train.csv", folder / "holdout.csv"
     for file, seed, amplitude, periods in zip(files, (1, 2), (0.7, 0.6), (PERIODS, HELD_OUT), strict=True):
         write(file, case.edit(recorded(case.robot, seed, amplitude, periods, case.gravity)))
-    refused, seconds = run("identify", urdf, files[0], "--period", str(PERIOD), "--out", model)
-    if not refused:
-        refused, seconds = run("diagnose", model, files[0], "--holdout", files[1], "--out", out)
-    if refused:
-        right = bool(case.says) and case.says in refused
-        print(f"{'right' if right else 'WRONG':6}{name:22}refused: {refused.strip()[:200]}", flush=True)
+    ran = sea_ident("identify", urdf, files[0], "--period", str(PERIOD), "--out", model)
+    if not ran.refused:
+        ran = sea_ident("diagnose", model, files[0], "--holdout", files[1], "--out", out)
+    if ran.refused:
+        right = bool(case.says) and case.says in ran.refused
+        print(f"{'right' if right else 'WRONG':6}{name:22}refused: {ran.refused.strip()[:200]}", flush=True)
         return right
     found = json.loads(out.read_text())
     named = {(m["effect"], m["joint"]) for m in found["missing"]}
     said = not case.says or any(case.says in text for text in found["warnings"])
     right = named == set(case.names) and said
-    right = right and (found["verdict"] == "none" or bool(case.names) or bool(case.says))
-    print(f"{'right' if right else 'WRONG':6}{name:22}{seconds:6.1f} s  {found['verdict']}", flush=True)
-    for m in found["missing"]:
-        values = ", ".join(f"{p['name']} {p['value']:.4g} +- {p['std']:.2g} {p['unit']}" for p in m["parameters"][:3])
-        print(f"{'':28}{values}", flush=True)
+    # what is named without reservation, or nothing: what is wrong with a file leaves nothing to be told
+    right = right and found["verdict"] in (SURE if case.names else ("none", "cannot_tell") if case.says else ("none",))
+    print(f"{'right' if right else 'WRONG':6}{name:22}{ran.seconds:6.1f} s  {found['verdict']}", flush=True)
+    for missing in found["missing"]:
+        print(f"{'':28}{in_words(missing)}", flush=True)
     return right
 
 
-def main() -> None:
-    """All cases, or those that are asked for."""
-    names = sys.argv[1:] or list(CASES)
-    unknown = [name for name in names if name not in CASES]
-    if unknown:
-        raise SystemExit(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
-    right = 0
-    for name in names:
-        with tempfile.TemporaryDirectory() as folder:
-            right += told(name, CASES[name], Path(folder))
-    print(f"{right} of {len(names)} right")
-
-
 if __name__ == "__main__":
-    main()
+    run_cases(CASES, told)
