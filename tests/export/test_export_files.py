@@ -115,3 +115,20 @@ def test_what_errs_in_a_sensor_is_named_as_left_out(model: Model, tmp_path: Path
         told = " ".join((*(written := export(late, tmp_path / name)).notes, *written.warnings))
         assert "no place for" in told
         assert "knee.position_delay" in told
+
+
+@pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
+def test_a_joint_that_is_elsewhere_is_to_be_corrected_in_the_description(tmp_path: Path) -> None:
+    """A URDF has a place for it, which the export does not write: the bodies beside it are those of the model."""
+    robot = load_robot("exo_leg")
+    a, b = 0.1 * np.random.default_rng(3).normal(size=(2, 3, 5))
+    recording = simulate(robot, FourierSeries(0.2, np.array([0.35, -0.2, 0.3]), a, b), periods=3, seed=1).recording
+    model = identify(
+        robot, recording, period=5.0, effects=(*base_effects(robot), make_effect("joint_placement", "knee"))
+    )
+    for name in ("leg.urdf", "leg.xml"):
+        written = exported(model, tmp_path / name)
+        (said,) = [text for text in written.warnings if "joint_placement" in text]
+        assert "correct the <origin> of the joint in the description, identify again" in said
+        assert not any("no place for" in text and "joint_placement" in text for text in written.notes)
+        assert not any("no place for" in text for text in written.warnings)
