@@ -122,7 +122,8 @@ def test_a_push_lasts_as_long_as_it_is_told_to(begin: float, end: float) -> None
 
 def test_a_push_that_ends_within_a_step_is_another_one() -> None:
     """The engine asks for the share of the step."""
-    ends = (0.3, 0.3 + 0.5 * STEP / 4.0, 0.3 + STEP / 4.0)
+    step = 5e-4  # that of `truth_and_run`, in a period of 4 s
+    ends = (0.3, 0.3 + 0.3 * step / 4.0, 0.3 + 0.6 * step / 4.0)
     shape = {"x": 0.0, "y": 0.6, "z": 0.8, "begin": 0.2, "every_period": 1.0}
     positions = [
         truth_and_run("exo_leg", (Planted("external_force", "knee", "library", 40.0, {**shape, "end": end}),))[

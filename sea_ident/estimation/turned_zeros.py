@@ -19,6 +19,9 @@ from sea_ident.robot import Robot
 LARGE = 5e-4
 """Share of the power of the torque, the mean of the joints, from which on what is left asks for a reason [-]."""
 
+GROSS = 2e-3
+"""The same from which on two joints are turned at once where one alone is no step towards all [-]."""
+
 STEP = 0.7
 """What is left with one joint turned, or two, over what was left, up to which they may be, ... [-]"""
 
@@ -47,8 +50,7 @@ def turned_zeros(robot: Robot, effects: Sequence[Effect], processed: ProcessedRe
     now = before
     while before >= LARGE:
         left, better = _best(trial, found, [(turn,) for turn in turns])
-        if found and now >= LARGE and left > STEP * now:
-            # of several that are turned, one alone may be no step towards all
+        if left > STEP * now and now >= (LARGE if found else GROSS):
             pairs = [pair for pair in combinations(turns, 2) if pair[0].joint != pair[1].joint]
             left, better = _best(trial, found, pairs)
         if left > STEP * now:

@@ -77,9 +77,9 @@ def test_a_model_that_has_one_is_not_given_it_again(nothing_missing, monkeypatch
     bench, start = nothing_missing
     tried = []
 
-    def with_left(share):
-        """As if the model left twenty times the noise, and with a joint moved a share of what is too much."""
-        far = start.fit.statistic / start.fit.dof / 20.0
+    def with_left(share, times=20.0):
+        """As if the model left some times the noise, and with a joint moved a share of what is too much."""
+        far = start.fit.statistic / start.fit.dof / times
         fit = replace(start.fit, whitened=start.fit.whitened / np.sqrt(far))
         less = 1.0 - (1.0 - share) * fit.excess / fit.statistic
         monkeypatch.setattr(
@@ -113,3 +113,7 @@ def test_a_model_that_has_one_is_not_given_it_again(nothing_missing, monkeypatch
     assert with_placements(bench, much, []) is not much
     promising = [SimpleNamespace(gain=0.94 * much.fit.excess)]
     assert with_placements(bench, much, promising) is much
+    tried.clear()
+    hardly = with_left(0.1, 9.0)
+    assert with_placements(bench, hardly, []) is hardly
+    assert tried == []

@@ -75,6 +75,8 @@ def processed_of(which, recording):
         {"l2": -1.2},
         {"l1": RIGHT, "l2": -RIGHT},
         {"l1": -RIGHT, "l2": RIGHT, "r1": 2.0 * RIGHT, "r2": -RIGHT},
+        {"l2": RIGHT, "r1": RIGHT, "r2": 2.0 * RIGHT},
+        {"l1": RIGHT, "l2": RIGHT, "r1": RIGHT, "r2": 2.0 * RIGHT},
     ],
 )
 def test_turned_zeros_are_found_in_whatever_number(both, turned):
@@ -86,8 +88,11 @@ def test_turned_zeros_are_found_in_whatever_number(both, turned):
         joint: round(by / RIGHT) for joint, by in turned.items()
     }
     assert {zero.name for zero in found} == {"encoder_offset"}
-    known = (*base_effects(two), *found)
-    assert turned_zeros(two, known, processed_of(two, wrong)) == ()
+    assert turned_zeros(two, (*base_effects(two), *found), processed_of(two, wrong)) == ()
+    # what the model has is its business, whatever its size
+    known = tuple(make_effect("encoder_offset", joint) for joint in turned)
+    again = turned_zeros(two, (*base_effects(two), *known), processed_of(two, wrong))
+    assert not turned.keys() & {zero.joint for zero in again}
 
 
 def test_nothing_is_turned_where_the_model_fits_or_lacks_something_else(both):
@@ -124,6 +129,10 @@ def test_a_robot_that_hangs_is_told_by_the_weight_of_its_bodies(both):
     said = misplaced_columns(two, base_effects(two), processed_of(two, hung))
     assert "gravity looks like (0, 0, 9.81) m/s2 in the root link, not (0, 0, -9.81)" in said
     assert misplaced_columns(hanging, base_effects(hanging), processed_of(hanging, hung)) is None
+    # and where the model lacks something else beside, which leaves more than a tenth of that
+    wave = 0.8 * np.sin(9.0 * hung.columns["q_l1"])
+    bent = hung.replace_columns({"tau_motor_l1": hung.columns["tau_motor_l1"] + wave})
+    assert "gravity looks like (0, 0, 9.81)" in misplaced_columns(two, base_effects(two), processed_of(two, bent))
     # nor where the zero of a joint is what turned the others
     turned = recording.replace_columns({"q_l1": recording.columns["q_l1"] + 2.0 * RIGHT})
     said = misplaced_columns(two, base_effects(two), processed_of(two, turned))
