@@ -83,11 +83,10 @@ class ParameterFits(Tangents):
         """Leave out further samples: where torques of a model jump at the reversal of a speed of their own."""
         left_out = self._left_out.copy()
         for effect in effects:
-            turning = effect.turning(self.data.motion, self.robot)
-            if turning is not None:
-                rows = around_reversal(turning[1])
+            for joint, speed in effect.turning(self.data.motion, self.robot).items():
+                rows = around_reversal(speed)
                 for e, equation in enumerate(self.data.equations):
-                    if equation.index == turning[0] and equation.kind is not EquationKind.LINK:
+                    if equation.index == joint and equation.kind is not EquationKind.LINK:
                         left_out[:, e] |= rows
         if np.any(left_out != self._left_out):
             self._left_out, self._whitenings = left_out, []

@@ -9,6 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.as_described import as_described
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
+from sea_ident.discrepancy.common_delays import with_a_common_delay
 from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
@@ -58,8 +59,8 @@ BEYOND_DOUBT = 0.02
 """... unless it leaves less than this share of the excess without it: no other form is so alike a push that comes and
 goes, and without it nothing else is told [-]."""
 
-MOVED_BEFORE = 3
-"""Effects before which it is asked whether joints are elsewhere."""
+WIDER_BEFORE = 3
+"""Effects before which it is asked whether signals of all joints are late, or joints elsewhere."""
 
 MOST_SETTLINGS = 3
 """Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
@@ -150,13 +151,14 @@ def search(
     while True:
         candidates = [c for c in scan(bench, now.fit, now.noise) if c.key not in ruled_out]
         tests = max(sum(c.tests for c in candidates), 1)
-        if len(added) < MOVED_BEFORE and not ruled_out:
-            moved = with_placements(bench, now, candidates)
-            if moved is not now:
-                more = len(moved.fit.effects) - len(now.fit.effects)
-                moved = _improved(bench, moved, len(added) + more, tried, ruled_out)
-                if _possible(bench, moved, len(added) + more):
-                    now, before = moved, now
+        if len(added) < WIDER_BEFORE and not ruled_out:
+            wider = with_a_common_delay(bench, now, candidates, tests)
+            wider = with_placements(bench, now, candidates) if wider is now else wider
+            if wider is not now:
+                more = len(wider.fit.effects) - len(now.fit.effects)
+                wider = _improved(bench, wider, len(added) + more, tried, ruled_out)
+                if _possible(bench, wider, len(added) + more):
+                    now, before = wider, now
                     added.extend([0.0] * more)
                     largest = np.maximum(largest, _largest_changes(bench, now.fit, len(added)))
                     continue

@@ -161,8 +161,8 @@ class Tangents(Columns):
         return out
 
     def links_of(self, effect: Effect) -> list[int]:
-        """Link equations of the joint of an effect."""
-        return [e for e in self.links if self.data.equations[e].joint == effect.joint]
+        """Link equations of the joint of an effect, all of one that acts at all joints."""
+        return [e for e in self.links if effect.joint in (None, self.data.equations[e].joint)]
 
     def signal_tangent(
         self, effect: SignalEffect, amount: Shape, effects: Sequence[Effect], parameters: dict[str, float]
@@ -181,7 +181,8 @@ class Tangents(Columns):
         chain = signals if effect in signals else (*signals, effect)
         motions, rows, springs, wholes = [], [], [], []
         # what stands at another joint does not see this signal
-        rest = [e for e in effects if isinstance(e, JointEffect | LoadEffect) and e.joint == effect.joint]
+        own_joint = [e for e in effects if effect.joint in (None, e.joint)]
+        rest = [e for e in own_joint if isinstance(e, JointEffect | LoadEffect)]
         for sign in (-1.0, 1.0):
             changed = replace(effect, **{amount.name: here + sign * step})  # type: ignore[arg-type]
             whole = tuple(changed if signal == effect else signal for signal in chain)

@@ -19,6 +19,9 @@ from sea_ident.exceptions import EffectError
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
+AT_ALL_JOINTS = ("position_delay", "torque_delay")
+"""Effects that are at every joint where they are given none, and not in the base."""
+
 
 @dataclass(frozen=True)
 class Column:
@@ -253,12 +256,12 @@ class Effect(ABC):
         """
         return np.ones(len(self.columns(robot)))
 
-    def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
-        """A speed (N,) at whose reversal its torque jumps, with the index of the joint; None for joint and motor speed.
+    def turning(self, motion: Motion, robot: Robot) -> dict[int, FloatArray]:
+        """Speeds (N,) at whose reversal its torque jumps, by the index of the joint; none beside joint and motor speed.
 
-        Where that speed passes zero a sample tells nothing: it may be on either side of the jump.
+        Where such a speed passes zero a sample tells nothing: it may be on either side of the jump.
         """
-        return None
+        return {}
 
     def plausible(self, values: FloatArray, parameters: Mapping[str, float]) -> bool:
         """Whether estimates (k,) of its columns make sense beside the other parameters of a model, by name.
@@ -352,7 +355,9 @@ class JointEffect(Effect):
 
 def titled(name: str, joint: str | None) -> str:
     """Name of an effect with its joint, for people."""
-    return name if joint is None else f"{name} at {joint}"
+    if joint is None:
+        return f"{name} at all joints" if name in AT_ALL_JOINTS else name
+    return f"{name} at {joint}"
 
 
 def smooth_sign(velocity: FloatArray, smoothing: float) -> FloatArray:

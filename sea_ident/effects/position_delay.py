@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Shape
-from sea_ident.effects.signal import SignalEffect, ahead, is_closed, rate_of, with_joint
+from sea_ident.effects.signal import DelayEffect, ahead, is_closed, rate_of, with_joint
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
 
@@ -18,14 +18,14 @@ LAG = Shape("lag", "s", 0.0, 0.1, logarithmic=False)
 
 
 @dataclass(frozen=True)
-class PositionDelay(SignalEffect):
+class PositionDelay(DelayEffect):
     """The link encoder shows q(t - delay); at a rigid joint the only encoder does.
 
     Readings that were filtered are late by more than one time: what comes through a filter of first order with a time
     constant, and is late by the rest of the delay, stands for any filter whose delays spread as far.
 
     Attributes:
-        joint: joint at which it acts.
+        joint: joint at which it acts, None where it does at all of them.
         delay: mean of the delays [s].
         lag: standard deviation of the delays, the time constant of that filter [s].
     """
@@ -44,22 +44,23 @@ class PositionDelay(SignalEffect):
 
     def corrected(self, robot: Robot, motion: Motion) -> Motion:
         """Q as it was at the time."""
-        i = self.required_index(robot)
-        shown = np.stack([motion.q[:, i], motion.dq[:, i], motion.ddq[:, i]], axis=1)
-        if self.lag > 0.0:
-            rates = np.column_stack([shown[:, 1:], rate_of(motion.time, shown[:, 2])])
-            shown = shown + self.lag * rates
-        q, dq, ddq = ahead(motion.time, shown, self.delay - self.lag).T
-        return with_joint(robot, motion, i, q, dq, ddq)
+        for i in self.indices(robot):
+            shown = np.stack([motion.q[:, i], motion.dq[:, i], motion.ddq[:, i]], axis=1)
+            if self.lag > 0.0:
+                rates = np.column_stack([shown[:, 1:], rate_of(motion.time, shown[:, 2])])
+                shown = shown + self.lag * rates
+            q, dq, ddq = ahead(motion.time, shown, self.delay - self.lag).T
+            motion = with_joint(robot, motion, i, q, dq, ddq)
+        return motion
 
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Q late."""
-        i = self.required_index(robot)
-        out = dict(signals)
-        for kind in ("q",) if robot.joints[i].elastic else ("q", "theta"):
-            if kind in signals:
-                out[kind] = signals[kind].copy()
-                out[kind][:, i] = ahead(time, _filtered(time, signals[kind][:, i], self.lag), self.lag - self.delay)
+        out = {kind: values.copy() if kind in ("q", "theta") else values for kind, values in signals.items()}
+        for i in self.indices(robot):
+            for kind in ("q",) if robot.joints[i].elastic else ("q", "theta"):
+                if kind in signals:
+                    late = _filtered(time, signals[kind][:, i], self.lag)
+                    out[kind][:, i] = ahead(time, late, self.lag - self.delay)
         return out
 
 

@@ -32,7 +32,7 @@ class SignalEffect(Effect):
 
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """None: its amounts are attributes."""
-        self.required_index(robot)
+        self.indices(robot)
         return ()
 
     def evaluate(self, state: State) -> Contribution:
@@ -62,6 +62,14 @@ class SignalEffect(Effect):
         """Values of its amounts."""
         return {amount.name: float(getattr(self, amount.name)) for amount in self.amounts}
 
+    def indices(self, robot: Robot) -> tuple[int, ...]:
+        """Indices of the joints whose signals it changes; by default that of its joint.
+
+        Raises:
+            EffectError: if none was given, where it acts at a joint.
+        """
+        return (self.required_index(robot),)
+
     def required_index(self, robot: Robot) -> int:
         """Index of its joint.
 
@@ -71,6 +79,17 @@ class SignalEffect(Effect):
         if self.joint is None:
             raise EffectError(f"the effect {self.name!r} acts at a joint; give joint=...")
         return robot.index(self.joint)
+
+
+class DelayEffect(SignalEffect):
+    """A signal that comes late: that of a joint or, where none is given, those of all joints by the same time.
+
+    Currents and angles that two devices record have one delay between them, not one per joint.
+    """
+
+    def indices(self, robot: Robot) -> tuple[int, ...]:
+        """That of its joint; all where it has none."""
+        return tuple(range(robot.n)) if self.joint is None else (self.required_index(robot),)
 
 
 WANDERED = 0.5

@@ -136,10 +136,10 @@ class TransmissionCoupling(Effect):
         """(3,) parameters of a motor of this description."""
         return ratio * np.array(self._motor(robot))
 
-    def turning(self, motion: Motion, robot: Robot) -> tuple[int, FloatArray] | None:
+    def turning(self, motion: Motion, robot: Robot) -> dict[int, FloatArray]:
         """The speed of the motor, which is not that of its joint."""
         i, k = self._indices(robot)
-        return i, motion.dtheta[:, i] + self.ratio * motion.dq[:, k]
+        return {i: motion.dtheta[:, i] + self.ratio * motion.dq[:, k]}
 
     def anchored(self, anchor: Anchor) -> "TransmissionCoupling":
         """With the inertia and the friction of the motor in the model, and at first the ratio that they say."""
