@@ -9,8 +9,8 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.as_described import as_described
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
-from sea_ident.discrepancy.common_delays import with_a_common_delay
 from sea_ident.discrepancy.columns import Key
+from sea_ident.discrepancy.common_delays import with_a_common_delay
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution

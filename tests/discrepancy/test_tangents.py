@@ -41,6 +41,10 @@ TOGETHER = {
         make_effect("torque_delay", "hip", delay=0.003),
         make_effect("position_delay", "knee", delay=0.002),
     ),
+    "all torques late, and all link encoders filtered": (
+        make_effect("torque_delay", delay=0.003),
+        make_effect("position_delay", delay=0.008, lag=0.005),
+    ),
     "a torque that comes late, of which one is a ripple": (
         make_effect("torque_ripple", "knee", order=4.0),
         make_effect("torque_delay", "knee", delay=0.003),

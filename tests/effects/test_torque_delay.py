@@ -13,7 +13,7 @@ def test_friction_jumps_in_the_record_before_the_motor_reverses():
     rng = np.random.default_rng(8)
     motion = FourierSeries(0.2, np.zeros(leg.n), *rng.standard_normal((2, leg.n, 3))).sample(samples=4000)
     effect = make_effect("torque_delay", "knee", delay=delay)
-    index, speed = effect.turning(motion, leg)
+    ((index, speed),) = effect.turning(motion, leg).items()
     assert leg.joint_names[index] == "knee"
     own, shown = (_crossings(motion.time, values) for values in (motion.dtheta[:, index], speed))
     later = own[own > delay]

@@ -1,0 +1,100 @@
+"""Signals of all joints that are late by the same time: told as one delay."""
+
+import warnings
+from types import SimpleNamespace
+
+import pytest
+
+from sea_ident.discrepancy import diagnose
+from sea_ident.discrepancy.candidates import scan
+from sea_ident.discrepancy.common_delays import PROMISED, common_delays, with_a_common_delay
+from sea_ident.discrepancy.settle import settle
+from sea_ident.estimation import identify
+from sea_ident.exceptions import SeaIdentWarning
+from tests.effects.chains import rigid_chain
+
+
+def on_the_bench(laboratory, *planted):
+    """Bench, settled model and candidates of a leg with effects."""
+    bench = laboratory.bench(laboratory.record(planted))
+    start = settle(bench, bench.effects)
+    return bench, start, scan(bench, start.fit, start.noise)
+
+
+@pytest.fixture(scope="module")
+def late(laboratory):
+    """Of a leg whose torques are all late."""
+    return on_the_bench(laboratory, ("torque_delay", None, [], {"delay": 0.006}))
+
+
+def test_one_delay_of_all_is_found(late, laboratory):
+    """The right one of the two, and how long it is; nothing more is missing."""
+    for name, delay, within, asked in (
+        ("torque_delay", 0.006, 8e-4, late),
+        ("position_delay", 0.004, 1e-5, on_the_bench(laboratory, ("position_delay", None, [], {"delay": 0.004}))),
+    ):
+        bench = asked[0]
+        now = with_a_common_delay(*asked, 1000)
+        (found,) = now.fit.effects[len(bench.effects) :]
+        assert (found.name, found.joint) == (name, None)
+        assert found.delay == pytest.approx(delay, abs=within)
+        assert now.fit.statistic < 1.3 * now.fit.dof
+        assert with_a_common_delay(bench, now, scan(bench, now.fit, now.noise), 1000) is now
+
+
+def test_the_delays_of_some_joints_are_theirs(laboratory):
+    asked = on_the_bench(laboratory, *(("torque_delay", joint, [], {"delay": 0.006}) for joint in ("hip", "ankle")))
+    assert with_a_common_delay(*asked, 1000) is asked[1]
+
+
+def test_it_is_not_asked_for_where_one_effect_explains_all(late, nothing_missing):
+    """Nor found where nothing is missing."""
+    bench, start, candidates = late
+    better = SimpleNamespace(gain=1.01 * PROMISED * start.fit.excess)
+    assert with_a_common_delay(bench, start, [better, *candidates], 1000) is start
+    bench, start = nothing_missing
+    assert with_a_common_delay(bench, start, scan(bench, start.fit, start.noise), 1000) is start
+
+
+@pytest.mark.scenario
+def test_a_base_that_leans_is_no_delay(laboratory):
+    asked = on_the_bench(laboratory, ("base_tilt", None, [0.03, 0.02], {}))
+    assert with_a_common_delay(*asked, 1000) is asked[1]
+
+
+def test_robots_without_springs_have_one_delay_of_all(leg):
+    """Torques that are late are angles that are early; of a single joint the delay is its own."""
+    actuator = "<mechanicalReduction>50</mechanicalReduction>"
+    chains = [
+        rigid_chain(
+            ["0 1 0"] * n, ["0 0 0.1"] * n, [1.0] * n, 'ixx="0.01" iyy="0.01" izz="0.01"', ["0 0 0.2"] * n, actuator
+        )
+        for n in (1, 2)
+    ]
+    assert [[effect.name for effect in common_delays(robot)] for robot in (*chains, leg)] == [
+        [],
+        ["torque_delay"],
+        ["torque_delay", "position_delay"],
+    ]
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("name", "delay", "least"), [("torque_delay", 0.006, 5e-5), ("position_delay", 0.002, 1e-7)])
+def test_currents_or_encoders_that_another_device_recorded_are_told(laboratory, leg, name, delay, least):
+    """Beside a spring that hangs beside a joint; what is repaired goes on another motion, in torque and simulation."""
+    effects = [(name, None, [], {"delay": delay}), ("parallel_spring", "hip", [20.0, 0.0], {})]
+    recording, holdout = (
+        laboratory.record(effects, periods=p, seed=s, motion=m) for p, s, m in ((10, 3, 0), (6, 7, 1))
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = diagnose(identify(leg, recording, period=5.0), recording, holdout=holdout)
+    assert found.verdict in ("named", "named_with_remainder")
+    assert {(m.effect, m.joint) for m in found.missing} == {(name, None), ("parallel_spring", "hip")}
+    own = next(m for m in found.missing if m.effect == name)
+    assert own.title == f"{name} at all joints"
+    (parameter,) = own.parameters
+    assert parameter.value == pytest.approx(delay, abs=3.0 * parameter.std)
+    assert least < parameter.std < 0.1 * delay
+    assert found.holdout.shrink > 0.6
+    assert found.simulation_gap["q"].shrink > 0.8
