@@ -78,7 +78,7 @@ def dissipates(bench: Bench, effect: Effect, values: FloatArray) -> bool:
 
 
 def slips_here(bench: Bench, effect: SpringHysteresis) -> NDArray[np.bool_]:
-    """(2,) which elements of a spring with dry friction slip to and fro on this motion."""
+    """(k,) which elements of a spring with dry friction slip to and fro on this motion."""
     travel = float(np.ptp(bench.data.motion.deflection[:, bench.robot.index(effect.required_joint)]))
     return np.asarray(2.0 * effect.slips < travel)
 

@@ -14,6 +14,7 @@ from sea_ident.discrepancy.common_delays import with_a_common_delay
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
+from sea_ident.discrepancy.friction_and_constant import both_at_once
 from sea_ident.discrepancy.judge import (
     SMALLEST_SHARE,
     at_a_bound,
@@ -40,7 +41,7 @@ from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.placements import with_placements
 from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again, settled_in_form
-from sea_ident.discrepancy.slips import by_the_first_element
+from sea_ident.discrepancy.slips import by_the_first_element, without_what_sticks
 from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
@@ -167,6 +168,10 @@ def search(
         if sought < MOST_EFFECTS and not _lost(now, before, sought, candidates):
             smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
             step = next_effect(bench, now, candidates, tests, smallest, tried)
+            both = both_at_once(bench, now, None if step is None else step[0], tests)
+            if both is not None:
+                step = both
+                added.append(both[1])
         if step is None and waits:
             last, waits = now, False
             now = _improved(bench, now, len(added), tried, ruled_out)
@@ -240,6 +245,7 @@ def _formed(bench: Bench, now: Settled) -> Settled:
     first = len(bench.effects)
     sharp = sharpened(bench, now.fit, now.noise, first)
     now = settled_in_form(bench, now if sharp is now.fit else settle_again(bench, sharp), first, at_its_kink)
+    now = settled_in_form(bench, now, first, without_what_sticks)
     return with_their_lags(bench, with_their_powers(bench, now, first), first)
 
 

@@ -25,9 +25,12 @@ class SpringHysteresis(OneWayEffect):
     Attributes:
         joint: joint at which it acts.
         slip: w, deflection at which the first element slips [rad] or [m].
+        elements: 1 without the second element, where that sticks all the time: then it is a part of the elastic law and
+            a constant, and cannot be told from a constant that is there.
     """
 
     slip: float = 0.005
+    elements: int = 2
 
     name: ClassVar[str] = "spring_hysteresis"
     side: ClassVar[Side] = Side.SPRING
@@ -46,7 +49,7 @@ class SpringHysteresis(OneWayEffect):
         torque, _ = self.units_of(robot)
         return tuple(
             Column(self.parameter_name(label), torque, self.name, self.joint, self.side, True)
-            for label in ("narrow", "wide")
+            for label in ("narrow", "wide")[: self.elements]
         )
 
     def variants(self, state: State) -> tuple["SpringHysteresis", ...]:
@@ -59,7 +62,11 @@ class SpringHysteresis(OneWayEffect):
 
     @property
     def slips(self) -> FloatArray:
-        """(2,) deflection at which each element slips [rad] or [m]."""
+        """(k,) deflection at which each element slips [rad] or [m]."""
+        return self._both[: self.elements]
+
+    @property
+    def _both(self) -> FloatArray:
         return self.slip * np.array([1.0, WIDER])
 
     def path(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -77,8 +84,8 @@ class SpringHysteresis(OneWayEffect):
 
     def advance_all(self, memory: FloatArray, distances: FloatArray) -> FloatArray:
         """Both elements stick until they slip."""
-        return np.clip(memory + distances[:, None] / self.slips, -1.0, 1.0)
+        return np.clip(memory + distances[:, None] / self._both, -1.0, 1.0)
 
     def remembered_columns(self, memory: FloatArray, dtheta: FloatArray) -> FloatArray:
         """z_1, z_2."""
-        return memory
+        return memory[:, : self.elements]
