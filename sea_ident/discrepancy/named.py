@@ -62,7 +62,10 @@ def named_effects(
         transfer = held.transfers[k] if held is not None and held.transfers else None
         others = alternatives.get(position, ())
         there = beside.get(fit.effects[position].joint or "", ())
-        shifts = [*other_models, *(each.shift for each in there if each.better)]
+        # what it may be instead is told by its name, and is not beside it
+        instead = {(other.effect, other.joint) for other in others}
+        besides = [each for each in there if (each.effect.name, each.effect.joint) not in instead]
+        shifts = [*other_models, *(each.shift for each in besides if each.better)]
         stds = np.max([plain, *(np.hypot(plain, shift) for shift in shifts)], axis=0)
         pushes = isinstance(fit.effects[position], ExternalForce)
         edges = edge_stds(bench, fit, selection.final.noise, position) if pushes else {}
