@@ -5,7 +5,7 @@ import pytest
 
 from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle, settled_in_form
-from sea_ident.discrepancy.slips import by_the_first_element
+from sea_ident.discrepancy.slips import by_the_first_element, with_its_second_element, without_what_sticks
 from sea_ident.effects import make_effect
 from sea_ident.effects.spring_hysteresis import WIDER
 
@@ -87,3 +87,41 @@ def test_a_search_tells_the_first_element(slipping, by_the_second):
     found = search(bench, bench.effects, begun)
     (friction,) = (e for e in found.effects if e.name == "spring_hysteresis")
     assert friction.slip == pytest.approx(SLIP, rel=0.02)
+
+
+def beside_a_constant(bench, start, slip, *, elements=2, constant=True, joint="knee"):
+    """A model with friction in a spring, and a constant in that of a joint."""
+    more = (make_effect("spring_offset", joint),) if constant else ()
+    effects = (*start.fit.effects, *more, make_effect("spring_hysteresis", "knee", slip=slip, elements=elements))
+    return bench.fit(effects, start.noise, start=start.fit.parameters)
+
+
+def test_an_element_that_sticks_is_left_out_beside_a_constant(slipping):
+    """Of the elastic law and the constant it is a sum."""
+    bench, start = slipping
+    both = beside_a_constant(bench, start, SLIP)
+    one = without_what_sticks(bench, both, start.noise, len(both.effects) - 1)
+    assert one.effects[-1].elements == 1
+    assert one.statistic == pytest.approx(both.statistic, abs=3.0)
+    narrow = one.slice_of(len(one.effects) - 1, bench.counts(one.effects)).start
+    assert one.values[narrow] == pytest.approx(NARROW, abs=3.0 * one.std(narrow))
+    assert without_what_sticks(bench, one, start.noise, len(one.effects) - 1) is one
+    for other in (
+        beside_a_constant(bench, start, SLIP, constant=False),
+        beside_a_constant(bench, start, SLIP, joint="hip"),
+    ):
+        assert without_what_sticks(bench, other, start.noise, len(other.effects) - 1) is other
+    assert with_its_second_element(bench, one, start.noise) is one
+
+
+def test_an_element_that_slips_stays(laboratory):
+    """And is added where it does."""
+    recording = laboratory.record([("spring_hysteresis", "knee", [0.5, 0.4], {"slip": 0.0015})], periods=10)
+    bench = laboratory.bench(recording)
+    start = settle(bench, bench.effects)
+    both = beside_a_constant(bench, start, 0.0015)
+    assert without_what_sticks(bench, both, start.noise, len(both.effects) - 1) is both
+    one = beside_a_constant(bench, start, 0.0015, elements=1)
+    again = with_its_second_element(bench, one, start.noise)
+    assert again.effects[-1].elements == 2
+    assert again.statistic == pytest.approx(both.statistic, rel=0.05)

@@ -67,6 +67,7 @@ ROWS = {
         Row("one", "one effect, gap >= 1 % of torque", 1, LIBRARY),
         Row("one_small", "same at 15 % size", 2, LIBRARY),
         Row("two", "two at once", 3, LIBRARY),
+        Row("same_joint", "two at once at one joint", 19, (*LIBRARY, *ZEROS)),
         Row("main_small", "one main effect and up to five small ones", 4, LIBRARY),
         Row("unknown", "effect not in the library", 5, UNKNOWN),
         Row("removed", "true effect taken out of the library", 6, LIBRARY),
@@ -223,6 +224,13 @@ def _hide(case: Case, gauge: Gauge, rng: np.random.Generator) -> tuple[Planted, 
         first = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), case.index)
         second = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), None, (first,))
         return first, second
+    if row == "same_joint":
+        entries = tuple(entry for entry in entries if not entry.whole)
+        robot = gauge.truth.robot
+        joint = int(rng.choice(robot.elastic_indices if len(robot.elastic_indices) else np.arange(robot.n)))
+        first = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), case.index, at=joint)
+        second = _one(case, gauge, rng, entries, _log(rng, 0.012, 0.05), None, (first,), at=joint)
+        return first, second
     if row == "main_small":
         found = [_one(case, gauge, rng, entries, _log(rng, 0.025, 0.06), case.index)]
         for _ in range(int(rng.integers(1, 6))):
@@ -247,8 +255,9 @@ def _one(
     target: float,
     turn: int | None,
     beside: tuple[Planted, ...] = (),
+    at: int | None = None,
 ) -> Planted:
-    """One effect: all take turns where a turn is given, in an order that the seed decides."""
+    """One effect, at any joint or at one: all take turns where a turn is given, in an order that the seed decides."""
     order = generator(case.seed, ROWS[case.row].number, 10**6).permutation(len(entries))
     # whose turn cannot be taken here is replaced by any, so that no effect follows from its neighbour's failure
     others = [int(k) for k in rng.permutation(len(entries))]
@@ -259,7 +268,10 @@ def _one(
     for entry in (entries[k] for k in tries):
         if len(gauge.truth.robot.elastic_indices) == 0 and (entry.springs or entry.effect == "transmission_coupling"):
             continue
-        for joint in rng.permutation(places(entry, gauge))[:3]:
+        where = (
+            rng.permutation(places(entry, gauge))[:3] if at is None else [k for k in places(entry, gauge) if k == at]
+        )
+        for joint in where:
             name = None if entry.whole else gauge.truth.robot.joint_names[int(joint)]
             if (entry.effect, name) in taken or (entry.effect in TREND_EFFECTS and name in trending):
                 continue
