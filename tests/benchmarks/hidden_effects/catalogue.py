@@ -208,6 +208,12 @@ ZEROS: tuple[Entry, ...] = (
     Entry("joint_offset", "library", lambda p: (p.sign() * 0.02, 0.5, {}), springs=True, accepted=("base_tilt",)),
 )
 
+WHOLE: tuple[Entry, ...] = (
+    Entry("torque_delay", "library", lambda p: (0.005, 0.05, {}), whole=True),
+    # of rigid joints it is the other one, backwards
+    Entry("position_delay", "library", lambda p: (0.002, 0.03, {}), springs=True, whole=True),
+)
+
 OTHER_FORMS: tuple[Entry, ...] = (
     Entry("stribeck_friction", "stiction", lambda p: (
         0.4 * p.coulomb, 4.0 * p.coulomb, {"speed": p.between(0.015, 0.04), "exponent": 1.0}),
@@ -256,7 +262,7 @@ REFERENCE: tuple[Entry, ...] = (
 # fmt: on
 
 ENTRIES: Mapping[tuple[str, str], Entry] = {
-    (entry.effect, entry.form): entry for entry in (*ZEROS, *LIBRARY, *OTHER_FORMS, *UNKNOWN, *REFERENCE)
+    (entry.effect, entry.form): entry for entry in (*ZEROS, *WHOLE, *LIBRARY, *OTHER_FORMS, *UNKNOWN, *REFERENCE)
 }
 
 

@@ -12,6 +12,7 @@ from tests.benchmarks.hidden_effects.catalogue import (
     OTHER_FORMS,
     REFERENCE,
     UNKNOWN,
+    WHOLE,
     ZEROS,
     Entry,
     draw_effect,
@@ -103,6 +104,7 @@ ROWS = {
         Row("few", "five periods, nothing or one effect", 16, LIBRARY, half=True, periods=5),
         Row("frictionless", "next to no friction, nothing or one effect", 17, LIBRARY, half=True, friction=1e-3),
         Row("zeros", "zeros of encoders and joints, gap 0.4 to 4 % of torque", 18, ZEROS, gap=(0.004, 0.04)),
+        Row("whole", "signals of all joints late by one time", 20, WHOLE, gap=(0.004, 0.04)),
         Row("reference", "payload and other absorbed changes, by reference", 9, REFERENCE),
     )
 }

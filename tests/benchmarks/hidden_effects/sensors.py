@@ -36,10 +36,10 @@ def signals(exact: Exact, truth: Truth, planted: tuple[Planted, ...]) -> dict[st
                 theta[:, i] += p.size
             case "encoder_eccentricity":
                 q[:, i] += p.size * np.sin(q[:, i] + p.shape["phase"])
-            case "position_delay":
-                q[:, i] = delayed(time, q[:, i], p.size, period)
-            case "torque_delay":
-                tau[:, i] = delayed(time, tau[:, i], p.size, period)
+            case "position_delay" | "torque_delay":
+                late = q if p.effect == "position_delay" else tau
+                for k in range(len(names)) if p.joint is None else (i,):
+                    late[:, k] = delayed(time, late[:, k], p.size, period)
             case "torque_constant":
                 tau[:, i] /= 1.0 + p.size
             case "common_torque_constant":

@@ -96,7 +96,7 @@ def lines_of(scores: list[Score]) -> list[Line]:
             add(Line("none", f"statistic over degrees of freedom, mean, P = {periods}", "-", value=mean, met=True))
         add(_share("none", f"verdict none, P = {periods}", "-", (s.verdict == "none" for s in none), lambda x: True))
     half = [name for name, row in ROWS.items() if row.half]
-    for row in ("one", "one_small", "other_form", "weak", "large", "zeros", *half):
+    for row in ("one", "one_small", "other_form", "weak", "large", "zeros", "whole", *half):
         _single(row, [s for s in by_row[row] if s.case.planted], add)
     for row in half:
         nothing = [s for s in by_row[row] if not s.case.planted]
@@ -138,7 +138,7 @@ def lines_of(scores: list[Score]) -> list[Line]:
                     lambda x: x >= 0.8))  # fmt: skip
         add(_number(row, "forward simulation of q, shrink, median", ">= 0.9", (s.shrink_simulation for s in right),
                     lambda x: x >= 0.9))  # fmt: skip
-    for row in ("one", "one_small", "two", "same_joint", "main_small", "large", "zeros", *half):
+    for row in ("one", "one_small", "two", "same_joint", "main_small", "large", "zeros", "whole", *half):
         errors = [abs(error) for s in by_row[row] for error in s.size_errors()]
         add(_share(row, "sizes within two standard deviations of the truth", ">= 95 %", (e < 2.0 for e in errors),
                    lambda x: x >= 0.95))  # fmt: skip
