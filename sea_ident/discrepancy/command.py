@@ -22,6 +22,7 @@ from sea_ident.effects.signal import SignalEffect
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.motion import FourierSeries, Motion
+from sea_ident.plain import plain
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -173,9 +174,9 @@ def command_of(
         return Command(like, reference, "")
     which = "the given controller" if controller is not None else "the velocity controller of `simulate`"
     text = (
-        f"from the recorded reference {which} gives a torque that is {100 * wrong[worst]:.2g} % off the measured one "
-        f"at {robot.joint_names[worst]!r}: in forward simulation the measured motion and torque of the motors stand in "
-        f"for the reference, held{gains}"
+        f"from the recorded reference {which} gives a torque that is {plain(100 * wrong[worst])} % off the measured "
+        f"one at {robot.joint_names[worst]!r}: in forward simulation the measured motion and torque of the motors "
+        f"stand in for the reference, held{gains}"
     )
     return StandIn(like, stand_in, text)
 

@@ -27,6 +27,7 @@ from sea_ident.effects import effect_from_dict
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation import Model
 from sea_ident.exceptions import ModelFileError
+from sea_ident.plain import plain
 
 IN_WORDS = {"training": "training", "holdout": "held out"}
 """Data on which a gap was measured, for people."""
@@ -109,7 +110,8 @@ class Diagnosis:
                 lines.append(f"  gap{told}")
         if self.next_experiment is not None:
             first, second = self.next_experiment.separates
-            lines.append(f"  next experiment: tells {first} from {second} {self.next_experiment.gain:.3g} times better")
+            times = plain(self.next_experiment.gain, 3)
+            lines.append(f"  next experiment: tells {first} from {second} {times} times better")
         lines.extend(
             f"  where: {x.joint} {x.equation}, {x.regime}: {x.excess_rms:.3g}, z {x.z:.4g}" for x in self.locations[:5]
         )

@@ -15,6 +15,7 @@ from sea_ident.discrepancy.fit import Fit
 from sea_ident.effects import Effect
 from sea_ident.effects.base import titled
 from sea_ident.effects.signal import SignalEffect
+from sea_ident.plain import plain
 
 
 class Verdict(StrEnum):
@@ -225,8 +226,8 @@ class MissingEffect:
             return ", ".join(p.amount for p in self.parameters)
         if self.torque_share >= TIMES:
             # a term of the law of a spring may be cancelled by others of it
-            return f"{self.torque_share:.2g} times the torque"
-        return f"{100 * self.torque_share:.2g} % of torque"
+            return f"{plain(self.torque_share)} times the torque"
+        return f"{plain(100 * self.torque_share)} % of torque"
 
 
 NOISE_FREE = 1e-6

@@ -36,6 +36,7 @@ from sea_ident.excitation import (
     design_excitation,
 )
 from sea_ident.motion import FourierSeries, Motion
+from sea_ident.plain import plain
 from sea_ident.robot import Robot
 from sea_ident.side_by_side import side_by_side
 from sea_ident.simulation import plant_from_identified
@@ -336,7 +337,7 @@ def with_next_experiment(
     else:
         advice = (
             f"To tell {first} from {second}, record the motion of the next experiment: it shows the difference "
-            f"{found.gain:.2g} times as "
+            f"{plain(found.gain)} times as "
             "clearly."
         )
     return replace(

@@ -8,6 +8,7 @@ from sea_ident.discrepancy.data import PeriodData
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.settle import Settled
+from sea_ident.plain import plain
 from sea_ident.processing.encoder_steps import EncoderSteps, repeated_errors, step_of
 
 MOST = 0.5
@@ -122,7 +123,7 @@ def hardly_deflected(data: PeriodData) -> tuple[str, ...]:
     rms = np.sqrt(np.mean((mean - mean.mean(axis=0)) ** 2, axis=0))
     return tuple(
         f"{data.source}: the spring of {joint.name} changes its deflection by {rms[i]:.2g} {joint.position_unit} (rms) "
-        f"only, {rms[i] / noise[i]:.2g} times the noise of its mean: what it carries is not known. Load it more, or "
+        f"only, {plain(rms[i] / noise[i])} times the noise of its mean: what it carries is not known. Load it more, or "
         "measure it better"
         for i, joint in enumerate(data.robot.joints)
         if joint.elastic and rms[i] < HARDLY * noise[i]

@@ -41,6 +41,7 @@ from sea_ident.effects import Effect
 from sea_ident.effects.external_force import ExternalForce
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
+from sea_ident.plain import plain
 from sea_ident.side_by_side import side_by_side
 
 LEAVES = 0.3
@@ -95,7 +96,7 @@ class Unnamed:
         same = f"The same as {self.effect} at {self.joint}, but {self.relative},"
         if self.share > LEAVES:
             return f"{same} leaves no more than noise, and fits better by odds of more than a thousand to one."
-        return f"{same} leaves {100 * self.share:.2g} % of what that one leaves."
+        return f"{same} leaves {plain(100 * self.share)} % of what that one leaves."
 
 
 def unnamed(

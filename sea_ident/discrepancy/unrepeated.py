@@ -44,6 +44,7 @@ from sea_ident.effects import Effect, make_effect, spring_effects
 from sea_ident.estimation import Model
 from sea_ident.estimation.scales import doubts_of_springs
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.plain import plain
 from sea_ident.processing import ProcessedRecording, filter_recording
 from sea_ident.processing.doubt import DoubtKind, texts_of
 from sea_ident.processing.variance import noise_from_curvature
@@ -380,7 +381,7 @@ def _text(
         item = next(f for f in found if f.effect.title == m.title)
         others = "".join(f" or {a.title}" for a in m.alternatives)
         parts.append(
-            f"The data speak for {m.title}{others} ({100 * m.torque_share:.2g} % of torque): with it "
+            f"The data speak for {m.title}{others} ({plain(100 * m.torque_share)} % of torque): with it "
             f"{item.better} of {BLOCKS} blocks are predicted better, {100 * item.gain:.0f} % less squared error."
         )
     parts.extend(

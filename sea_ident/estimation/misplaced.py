@@ -9,6 +9,7 @@ from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, State
 from sea_ident.estimation.put_right import Order, Trial, as_they_say
 from sea_ident.motion import Motion
+from sea_ident.plain import plain
 from sea_ident.processing import ProcessedRecording
 from sea_ident.robot import Robot
 
@@ -86,8 +87,8 @@ def misplaced_columns(robot: Robot, effects: Sequence[Effect], processed: Proces
     if not (after < most * before and after < EXPLAINED):
         return None
     return (
-        f"{processed.source}: {order.text}. With that the model leaves {100.0 * after**0.5:.2g} % of the torque beyond "
-        f"its noise, without it {100.0 * before**0.5:.2g} %"
+        f"{processed.source}: {order.text}. With that the model leaves {plain(100.0 * after**0.5)} % of the torque "
+        f"beyond its noise, without it {plain(100.0 * before**0.5)} %"
     )
 
 

@@ -12,6 +12,7 @@ from sea_ident.estimation.observations import Observations, SpringSide
 from sea_ident.estimation.spring_result import SpringResult, Verdict
 from sea_ident.estimation.springs import spring_columns
 from sea_ident.motion import Motion
+from sea_ident.plain import plain
 from sea_ident.processing.doubt import DoubtKind, texts_of
 
 WRONG = 0.1
@@ -135,8 +136,8 @@ def _with_warning(found: SpringAgreement, verdict: Verdict, before: float = 0.0)
     if before > max(WRONG, ALREADY * found.nrms):
         # on the same motion it would be so again: neither an encoder nor this motion has to differ
         why = (
-            f"on the recording that it was found on it left {100 * before:.3g} %: it lacks something, or the dynamic "
-            "model that gives this torque does, or does not tell it; see the warnings of the model"
+            f"on the recording that it was found on it left {plain(100 * before, 3)} %: it lacks something, or the "
+            "dynamic model that gives this torque does, or does not tell it; see the warnings of the model"
         )
     elif verdict is not Verdict.NOT_EXCITED:
         why = (
@@ -144,7 +145,7 @@ def _with_warning(found: SpringAgreement, verdict: Verdict, before: float = 0.0)
             "`diagnose` looks for it"
         )
     text = (
-        f"the law of the spring of {found.joint!r} leaves {100 * found.nrms:.3g} % of its torque ({found.rms:.3g} of "
-        f"{found.rms_torque:.3g} {found.unit} rms): {why}"
+        f"the law of the spring of {found.joint!r} leaves {plain(100 * found.nrms, 3)} % of its torque "
+        f"({found.rms:.3g} of {found.rms_torque:.3g} {found.unit} rms): {why}"
     )
     return replace(found, warning=text)

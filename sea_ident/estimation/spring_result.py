@@ -5,6 +5,7 @@ from enum import StrEnum
 
 from sea_ident.effects import Effect
 from sea_ident.estimation.uncertainty import student_factor
+from sea_ident.plain import plain
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ class SpringResult:
                 f"{self.stiffness:.4g}: standard deviations count how far that is"
             )
         return (
-            f"spring of {self.joint}: its law leaves {times:.2g} times the noise of its torque "
+            f"spring of {self.joint}: its law leaves {plain(times)} times the noise of its torque "
             f"({self.rms_residual:.3g} of {self.rms_torque:.3g}): it lacks something, or the dynamic model that gives "
             f"this torque does. {counted}; diagnose tells what it is"
         )

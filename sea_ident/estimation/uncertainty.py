@@ -12,6 +12,7 @@ from sea_ident.estimation.estimators import Estimate
 from sea_ident.estimation.observations import Observations, stands
 from sea_ident.estimation.period_scores import period_scores
 from sea_ident.estimation.turning import turning_covariance
+from sea_ident.plain import plain
 
 FEWEST_BLOCKS = 20
 """Smallest number of pieces of a period from which a covariance is estimated."""
@@ -172,7 +173,7 @@ def _misfit(
     if not np.any(large):
         return covariance, ""
     names = observations.robot.joint_names
-    parts = ", ".join(f"{names[i]} {ratio[i] ** 0.5:.2g} times" for i in np.flatnonzero(large))
+    parts = ", ".join(f"{names[i]} {plain(ratio[i] ** 0.5)} times" for i in np.flatnonzero(large))
     steps = observations.processed.encoder_steps
     if steps is not None and np.all(steps.joints[large]):
         cause = (
@@ -197,8 +198,8 @@ def _disagreement(observations: Observations, estimate: Estimate, covariance: Fl
     names = observations.base.names
     worst = int(np.argmax(np.abs(np.log(np.maximum(seen, 1e-300) / np.maximum(assumed, 1e-300)))))
     return (
-        f"standard deviations from the spread between periods are {ratio:.2g} times those of white torque noise "
-        f"(eq. 13), at worst {seen[worst] / max(assumed[worst], 1e-300):.2g} times for {names[worst]}: the noise is "
+        f"standard deviations from the spread between periods are {plain(ratio)} times those of white torque noise "
+        f"(eq. 13), at worst {plain(seen[worst] / max(assumed[worst], 1e-300))} times for {names[worst]}: the noise is "
         "not what eq. 13 assumes; the spread between periods is reported",
     )
 
@@ -255,8 +256,8 @@ def _with_drift(
     if ratio <= stats.chi2.ppf(DRIFT, independent) / independent:
         return covariance, freedom, ()
     text = (
-        f"whole periods differ by {ratio**0.5:.2g} times what the scatter within them explains: something drifts from "
-        "period to period. Standard deviations count it; record more periods"
+        f"whole periods differ by {plain(ratio**0.5)} times what the scatter within them explains: something drifts "
+        "from period to period. Standard deviations count it; record more periods"
     )
     return ratio * covariance, min(freedom, independent), (text,)
 

@@ -7,6 +7,7 @@ from scipy.ndimage import median_filter
 
 from sea_ident._typing import FloatArray
 from sea_ident.exceptions import RecordingError
+from sea_ident.plain import plain
 from sea_ident.recordings import Recording
 from sea_ident.robot import Joint, Robot
 from sea_ident.robot.describe import counted
@@ -146,9 +147,9 @@ def _spikes(recording: Recording, values: FloatArray, column: str) -> list[str]:
     k = int(spikes[0])
     return [
         f"{recording.source}: column {column} has {counted(spikes.size, 'spike')}, the first at sample {k} (time "
-        f"{recording.time[k]:g} s), {beside[k] / usual:.3g} times as far from its neighbours as 99 % of the samples: "
-        "a few such samples outweigh the others. Look at the sensor and its wiring, or identify with the robust "
-        "estimator"
+        f"{recording.time[k]:g} s), {plain(beside[k] / usual, 3)} times as far from its neighbours as 99 % of the "
+        "samples: a few such samples outweigh the others. Look at the sensor and its wiring, or identify with the "
+        "robust estimator"
     ]
 
 

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sea_ident.estimation import Model, Verdict
+from sea_ident.plain import plain
 from sea_ident.report.content import Content
 from sea_ident.report.section import ModelSection
 from sea_ident.report.sections.parameters import POOR_PERCENT, parameter_rows
@@ -47,7 +48,7 @@ class Findings(ModelSection):
         findings.extend(Finding("warn", "Warning", text) for text in model.warnings)
         share = fit.rms_residual / np.maximum(fit.rms_torque, 1e-300)
         tiles = [
-            (f"{100 * float(share.max()):.2g} %", "largest residual, as a share of the torque"),
+            (f"{plain(100 * float(share.max()))} %", "largest residual, as a share of the torque"),
             (str(model.base.rank), "base parameters"),
             (f"{fit.condition_number:.3g}", "condition number of F"),
             (f"{fit.log_det:.1f}", "log det F\N{PRIME}F"),
@@ -76,7 +77,7 @@ def _agreement(model: Model, index: int) -> Finding:
     """Whether the residual of a joint is more than its noise away from reversals."""
     fit, joint = model.fit, model.robot.joints[index]
     rms, torque, unit = float(fit.rms_residual[index]), float(fit.rms_torque[index]), joint.torque_unit
-    text = f"the model leaves {rms:.3g} of {torque:.3g} {unit} rms ({100.0 * rms / max(torque, 1e-300):.2g} %)"
+    text = f"the model leaves {rms:.3g} of {torque:.3g} {unit} rms ({plain(100.0 * rms / max(torque, 1e-300))} %)"
     if fit.agreement is None:
         return Finding("", joint.name, f"{text}; with one period its noise is not known.")
     away, noise, share = fit.agreement.rms[index], fit.agreement.noise[index], fit.agreement.share[index]
@@ -143,7 +144,7 @@ def _springs(model: Model) -> list[Finding]:
         noise = "" if spring.noise is None else f", noise {spring.noise:.2g} {unit}"
         text = (
             f"{str(spring.verdict).replace('_', ' ')}: {spring.note}; it leaves {spring.rms_residual:.3g} of "
-            f"{spring.rms_torque:.3g} {unit} rms ({100.0 * share:.2g} %{noise})."
+            f"{spring.rms_torque:.3g} {unit} rms ({plain(100.0 * share)} %{noise})."
         )
         found.append(Finding("good" if good else "warn", f"{spring.joint} spring", text))
     return found
@@ -154,7 +155,7 @@ def _validations(joints: tuple[Joint, ...], content: Content) -> list[Finding]:
     for validation in content.validations:
         worst = int(np.argmax(validation.nrms))
         text = (
-            f"{validation.recording}, which was not used: at worst {100 * validation.nrms[worst]:.2g} % of the "
+            f"{validation.recording}, which was not used: at worst {plain(100 * validation.nrms[worst])} % of the "
             f"torque, at the {validation.joint_names[worst]}"
         )
         away = validation.agreement
