@@ -5,6 +5,8 @@ than not. Without the constant the elements that stick stand in for it, as sprin
 friction the constant explains little, and the law of the spring bends to whatever comes next.
 """
 
+from collections.abc import Sequence
+
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.fit import Fit
@@ -26,12 +28,15 @@ LEAVES = 0.3
 """Share of what the best single effect leaves that both may leave, to be taken in its place [-]."""
 
 
-def both_at_once(bench: Bench, now: Settled, single: Fit | None, tests: int) -> tuple[Fit, float] | None:
+def both_at_once(
+    bench: Bench, now: Settled, candidates: Sequence[Candidate], single: Fit | None, tests: int
+) -> tuple[Fit, float] | None:
     """The model with friction and a constant in one spring, where that is better than any one effect.
 
     Args:
         bench: the recording.
         now: the model.
+        candidates: the effects of the library around it.
         single: the model with the best single effect; None where there is none.
         tests: number of shapes of all candidates.
 
@@ -41,7 +46,7 @@ def both_at_once(bench: Bench, now: Settled, single: Fit | None, tests: int) -> 
     fit, noise = now.fit, now.noise
     rubs = single is not None and isinstance(single.effects[-1], SpringHysteresis) and not physical(bench, single, -1)
     best = fit if single is None else single
-    began = [_begun(bench, now, joint) for joint in _springs(bench, now)]
+    began = [_begun(bench, now, joint) for joint in _springs(bench, now, candidates, tests)]
     if not began:
         return None
     begun, candidate = max(began, key=lambda each: each[1].gain - each[0].statistic)
@@ -60,10 +65,17 @@ def both_at_once(bench: Bench, now: Settled, single: Fit | None, tests: int) -> 
     return (new, p_value) if p_value <= FAMILY_LEVEL and (better or as_good) else None
 
 
-def _springs(bench: Bench, now: Settled) -> list[str]:
-    """Joints with springs that the model has neither friction nor a constant in."""
-    taken = {effect.joint for effect in now.fit.effects if isinstance(effect, SpringHysteresis | SpringOffset | Offset)}
-    return [joint.name for joint in bench.robot.joints if joint.elastic and joint.name not in taken]
+def _springs(bench: Bench, now: Settled, candidates: Sequence[Candidate], tests: int) -> list[str]:
+    """Joints in whose springs either explains something, and the model has neither."""
+    fit, noise = now.fit, now.noise
+    taken = {effect.joint for effect in fit.effects if isinstance(effect, SpringHysteresis | SpringOffset | Offset)}
+    seen = {
+        candidate.effect.joint
+        for candidate in candidates
+        if isinstance(candidate.effect, SpringHysteresis | SpringOffset)
+        and significance(candidate.gain, candidate.columns, tests, fit, noise) <= FAMILY_LEVEL
+    }
+    return [name for name in bench.robot.joint_names if name in seen - taken]
 
 
 def _begun(bench: Bench, now: Settled, joint: str) -> tuple[Fit, Candidate]:

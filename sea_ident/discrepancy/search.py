@@ -168,7 +168,7 @@ def search(
         if sought < MOST_EFFECTS and not _lost(now, before, sought, candidates):
             smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
             step = next_effect(bench, now, candidates, tests, smallest, tried)
-            both = both_at_once(bench, now, None if step is None else step[0], tests)
+            both = both_at_once(bench, now, candidates, None if step is None else step[0], tests)
             if both is not None:
                 step = both
                 added.append(both[1])

@@ -43,10 +43,13 @@ def test_both_are_found_where_no_single_one_is(with_a_constant):
     bench, start = with_a_constant
     eccentric = single(bench, start, make_effect("encoder_eccentricity", JOINT))
     assert eccentric.excess > 0.4 * start.fit.excess
-    found, p_value = both_at_once(bench, start, eccentric, 1000)
+    candidates = scan(bench, start.fit, start.noise)
+    found, p_value = both_at_once(bench, start, candidates, eccentric, 1000)
     assert p_value < FAMILY_LEVEL
     assert [effect.name for effect in found.effects[-2:]] == ["spring_offset", "spring_hysteresis"]
     assert found.statistic < 1.3 * found.dof
+    others = [candidate for candidate in candidates if candidate.effect.joint != JOINT]
+    assert both_at_once(bench, start, others, eccentric, 1000) is None
     assert found.effects[-1].elements == 1
     names = [column.name for column in found.columns]
     for name, true in ((f"{JOINT}.spring_offset", CONSTANT), (f"{JOINT}.spring_hysteresis_narrow", FRICTION)):
@@ -68,11 +71,16 @@ def test_one_of_them_alone_is_told_alone(laboratory, nothing_missing):
     """Friction that does without a constant, a constant without friction, and where nothing is missing."""
     bench = laboratory.bench(laboratory.record(rubbing()))
     start = settle(bench, bench.effects)
-    assert both_at_once(bench, start, single(bench, start, make_effect("spring_hysteresis", JOINT)), 1000) is None
+    candidates = scan(bench, start.fit, start.noise)
+    own = single(bench, start, make_effect("spring_hysteresis", JOINT))
+    assert both_at_once(bench, start, candidates, own, 1000) is None
     bench = laboratory.bench(laboratory.record([("spring_offset", JOINT, [CONSTANT], {})]))
     start = settle(bench, bench.effects)
-    assert both_at_once(bench, start, single(bench, start, make_effect("spring_offset", JOINT)), 1000) is None
-    assert both_at_once(*nothing_missing, None, 1000) is None
+    candidates = scan(bench, start.fit, start.noise)
+    own = single(bench, start, make_effect("spring_offset", JOINT))
+    assert both_at_once(bench, start, candidates, own, 1000) is None
+    bench, start = nothing_missing
+    assert both_at_once(bench, start, scan(bench, start.fit, start.noise), None, 1000) is None
 
 
 @pytest.mark.scenario
