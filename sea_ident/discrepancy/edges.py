@@ -148,12 +148,12 @@ def without_another(bench: Bench, fit: Fit, noise: NoiseFloor, push: ExternalFor
     time = bench.data.motion.time
     for position in range(first, len(fit.effects)):
         other = fit.effects[position]
-        if isinstance(other, ExternalForce) and _at_once(push.pushes(time), other.pushes(time)):
+        if isinstance(other, ExternalForce) and at_once(push.pushes(time), other.pushes(time)):
             fit = min(fit, _moved_point(bench, fit, noise, position), key=lambda each: each.statistic)
     return fit
 
 
-def _at_once(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
+def at_once(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
     """Whether two pushes come in mostly the same samples (N,)."""
     return int(np.sum(one & other)) > AT_ONCE * max(int(np.sum(one)), int(np.sum(other)))
 

@@ -36,6 +36,7 @@ from sea_ident.discrepancy.next_effect import (
     next_effect,
     visible_changes,
 )
+from sea_ident.discrepancy.one_push import as_one_push
 from sea_ident.discrepancy.one_zero import as_one_zero
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.placements import with_placements
@@ -190,8 +191,9 @@ def search(
             added.pop()
             now = before
             break
-    now, left = as_one_zero(bench, now, len(added))
-    added = [added[k] for k in left]
+    for as_one in (as_one_zero, as_one_push):
+        now, left = as_one(bench, now, len(added))
+        added = [added[k] for k in left]
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
     now = settled_in_form(bench, now, len(now.fit.effects) - len(added), by_the_first_element)

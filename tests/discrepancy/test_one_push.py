@@ -1,0 +1,62 @@
+"""Two pushes at the same time that are one on another link are told as one."""
+
+import pytest
+
+from sea_ident.discrepancy.one_push import as_one_push
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.effects import make_effect
+
+PERIOD = 5.0
+START, STOP = 2.64, 3.56
+
+
+def push(joint, start=START, stop=STOP, **point):
+    return make_effect("external_force", joint, start=start, stop=stop, period=PERIOD, **point)
+
+
+@pytest.fixture(scope="module")
+def pushed(laboratory):
+    """A leg that is pushed at its knee, by twice as much at a time at its ankle."""
+    planted = [(push("knee"), [4.0, 0.0, 3.0]), (push("ankle", 0.6, 1.2), [6.0, 0.0, 0.0])]
+    bench = laboratory.bench(laboratory.record(planted, periods=6))
+    return bench, settle(bench, bench.effects)
+
+
+def fitted(pushed, *pushes):
+    bench, start = pushed
+    effects = (*start.fit.effects, *pushes)
+    return settle_again(bench, bench.refine(effects, start.noise, start=start.fit.parameters, only=len(bench.effects)))
+
+
+def test_two_on_the_wrong_links_are_one_on_the_right_one(pushed):
+    bench, _ = pushed
+    beside = push("ankle", 0.6, 1.2)
+    now = fitted(pushed, push("hip"), beside, push("ankle", point_x=0.01, point_z=0.01))
+    assert now.fit.statistic < 3.0 * now.fit.dof
+    after, left = as_one_push(bench, now, 3)
+    assert left == [0, 1]
+    found, other = after.fit.effects[len(bench.effects) :]
+    assert found.joint == "knee"
+    assert (other.joint, other.start) == ("ankle", pytest.approx(0.6))
+    assert after.fit.statistic < 1.2 * after.fit.dof
+    assert after.fit.parameters["knee.external_force_x"] == pytest.approx(4.0, abs=0.3)
+    assert after.fit.parameters["knee.external_force_z"] == pytest.approx(3.0, abs=0.3)
+
+
+def test_pushes_at_other_times_or_other_effects_stay(pushed):
+    bench, _ = pushed
+    now = fitted(pushed, push("knee"), make_effect("torque_offset", "hip"), push("ankle", 0.6, 1.2))
+    after, left = as_one_push(bench, now, 3)
+    assert after is now
+    assert left == [0, 1, 2]
+
+
+def test_two_that_no_other_does_for_stay(pushed, laboratory):
+    """Pushes at the same time on both ends of the leg, across each other."""
+    planted = [(push("hip"), [0.0, 0.0, 40.0]), (push("ankle"), [8.0, 0.0, 0.0])]
+    bench = laboratory.bench(laboratory.record(planted, periods=6))
+    start = settle(bench, bench.effects)
+    now = fitted((bench, start), push("hip"), push("ankle"))
+    after, left = as_one_push(bench, now, 2)
+    assert left == [0, 1]
+    assert after is now
