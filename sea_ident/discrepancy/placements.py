@@ -5,13 +5,11 @@ take it for whatever is alike in one of them, and so it is asked first, where no
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate
-from sea_ident.discrepancy.fit import Solution
+from sea_ident.discrepancy.explained_by_one import Added, explained_by_one
 from sea_ident.discrepancy.settle import Settled, settle_again
-from sea_ident.effects import Effect
 from sea_ident.effects.joint_placement import JointPlacement
 from sea_ident.side_by_side import side_by_side
 
@@ -24,14 +22,11 @@ PLAIN = 10.0
 NEARLY_ALL = 0.8
 """Share of the excess that joints must explain, and more than any other effect promises [-]."""
 
+AS_LITTLE = 2.0
+"""Times what joints leave that one effect, fitted, may leave to be what is missing after all [-]."""
+
 WORTH = 0.5
 """Share of what is left that one joint more must explain [-]."""
-
-HOPEFUL = 0.3
-"""The same for where they are by a first step."""
-
-ROUNDS = 3
-"""Rounds in which the bodies that a joint carries and where it is follow each other."""
 
 
 def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate]) -> Settled:
@@ -53,34 +48,14 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
     places = [place for place in JointPlacement.instances(bench.robot) if place.joint not in present]
     now = start
     while places:
-        tried = list(side_by_side(_Moved(bench, now), places))
+        tried = list(side_by_side(Added(bench, now), places))
         best = min(range(len(places)), key=lambda k: tried[k][0])
         new = bench.again(tried[best][1], now.noise)
         if now.fit.statistic - new.statistic < WORTH * now.fit.excess:
             break
         del places[best]
         now = settle_again(bench, settle_again(bench, new).fit)
-    return now if excess - now.fit.excess > max(NEARLY_ALL * excess, promised) else start
-
-
-@dataclass(frozen=True, eq=False)
-class _Moved:
-    """Moves one joint more.
-
-    Attributes:
-        bench: the recording.
-        now: the model.
-    """
-
-    bench: Bench
-    now: Settled
-
-    def __call__(self, place: Effect) -> tuple[float, Solution]:
-        """What is left with it, and the model."""
-        bench, fit = self.bench, self.now.fit
-        effects = (*bench.anchored(fit.effects, fit.parameters), *bench.anchored((place,), fit.parameters))
-        new = bench.fit(effects, self.now.noise, start=fit.parameters, tangents=False)
-        for _ in range(ROUNDS if fit.statistic - new.statistic > HOPEFUL * fit.excess else 0):
-            anchored = bench.anchored(new.effects, new.parameters)
-            new = bench.fit(anchored, self.now.noise, start=new.parameters, tangents=False)
-        return new.statistic, new.solution
+    if excess - now.fit.excess <= max(NEARLY_ALL * excess, promised):
+        return start
+    left_by_one = max(excess - explained_by_one(bench, start, candidates), 0.0)
+    return start if left_by_one <= AS_LITTLE * now.fit.excess else now

@@ -10,7 +10,7 @@ from sea_ident.discrepancy.as_described import as_described
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key
-from sea_ident.discrepancy.common_delays import with_a_common_delay
+from sea_ident.discrepancy.common_delays import as_one_delay, with_a_common_delay
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
@@ -191,7 +191,7 @@ def search(
             added.pop()
             now = before
             break
-    for as_one in (as_one_zero, as_one_push):
+    for as_one in (as_one_zero, as_one_push, as_one_delay):
         now, left = as_one(bench, now, len(added))
         added = [added[k] for k in left]
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)

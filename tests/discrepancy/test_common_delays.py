@@ -1,14 +1,18 @@
 """Signals of all joints that are late by the same time: told as one delay."""
 
 import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from sea_ident.discrepancy import common_delays as common_delays_module
 from sea_ident.discrepancy import diagnose
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.common_delays import PROMISED, common_delays, with_a_common_delay
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.common_delays import PROMISED, as_one_delay, common_delays, with_a_common_delay
+from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.settle import settle, settle_again
+from sea_ident.effects import make_effect
 from sea_ident.estimation import identify
 from sea_ident.exceptions import SeaIdentWarning
 from tests.effects.chains import rigid_chain
@@ -42,14 +46,58 @@ def test_one_delay_of_all_is_found(late, laboratory):
         assert with_a_common_delay(bench, now, scan(bench, now.fit, now.noise), 1000) is now
 
 
+def with_their_delays(bench, start, *joints):
+    """The model with delays of some joints, refined."""
+    delays = (make_effect("torque_delay", joint, delay=0.005) for joint in joints)
+    effects = (*start.fit.effects, *delays)
+    return settle_again(bench, bench.refine(effects, start.noise, start=start.fit.parameters, only=len(bench.effects)))
+
+
 def test_the_delays_of_some_joints_are_theirs(laboratory):
+    """Before a search and after it."""
     asked = on_the_bench(laboratory, *(("torque_delay", joint, [], {"delay": 0.006}) for joint in ("hip", "ankle")))
-    assert with_a_common_delay(*asked, 1000) is asked[1]
+    bench, start, _ = asked
+    assert with_a_common_delay(*asked, 1000) is start
+    now = with_their_delays(bench, start, "hip", "ankle")
+    assert as_one_delay(bench, now, 2) == (now, [0, 1])
 
 
-def test_it_is_not_asked_for_where_one_effect_explains_all(late, nothing_missing):
+def test_delays_that_were_found_one_by_one_are_one(late):
+    """What stands between them stays; one that is a little better than that of a joint is not enough."""
+    bench, start, _ = late
+    offset = make_effect("torque_offset", "hip")
+    delays = [make_effect("torque_delay", joint, delay=0.005) for joint in ("hip", "knee", "ankle")]
+    effects = (*start.fit.effects, delays[0], offset, *delays[1:])
+    new = bench.refine(effects, start.noise, start=start.fit.parameters, only=len(bench.effects))
+    after, left = as_one_delay(bench, settle_again(bench, new), 4)
+    assert left == [0, 1]
+    found, other = after.fit.effects[len(bench.effects) :]
+    assert (found.name, found.joint) == ("torque_delay", None)
+    assert found.delay == pytest.approx(0.006, abs=8e-4)
+    assert other == offset
+    assert as_one_delay(bench, after, 2) == (after, [0, 1])
+
+
+def test_what_is_there_is_not_asked_for_again(late, monkeypatch):
+    bench, start, _ = late
+    asked = []
+    monkeypatch.setattr(common_delays_module, "scan", lambda *given: asked.append(given[3]) or [])
+    there = replace(start.fit, effects=(*start.fit.effects, make_effect("torque_delay")))
+    with_a_common_delay(bench, replace(start, fit=there), [], 1000)
+    assert [[effect.name for effect in kinds] for kinds in asked] == [["position_delay"]]
+
+
+def test_it_is_not_asked_for_where_one_effect_explains_all(late, nothing_missing, monkeypatch):
     """Nor found where nothing is missing."""
     bench, start, candidates = late
+    whole = refitted(bench, start.fit.effects, make_effect("torque_delay"), (), start.noise, start.fit.parameters)
+    assert with_a_common_delay(bench, start, [], 1000) is not start
+    more = SimpleNamespace(gain=1.001 * (start.fit.statistic - whole.statistic))
+    with monkeypatch.context() as patched:
+        patched.setattr(common_delays_module, "PROMISED", 2.0)
+        assert with_a_common_delay(bench, start, [more], 1000) is start
+        patched.setattr(common_delays_module, "explained_by_one", lambda *given: more.gain)
+        assert with_a_common_delay(bench, start, [], 1000) is start
     better = SimpleNamespace(gain=1.01 * PROMISED * start.fit.excess)
     assert with_a_common_delay(bench, start, [better, *candidates], 1000) is start
     bench, start = nothing_missing
