@@ -209,6 +209,11 @@ def _described(bench: Bench, now: Settled, added: int) -> int:
 def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:
     """A model with what its description gives and it lacks, as far as it is needed, and the significance of that."""
     now = as_described(bench, start)
+    if now is not start:
+        # encoders that are late at all links are as good as viscous friction there, but for what tells them apart
+        late = with_a_common_delay(bench, start, (), 1)
+        if late is not start and late.fit.statistic / late.fit.dof < now.fit.statistic / now.fit.dof:
+            return late, [0.0]
     count = len(now.fit.effects) - len(start.fit.effects)
     now, added = _eliminate(bench, now, [0.0] * count, count, fewest=0)
     positions = range(len(now.fit.effects) - len(added), len(now.fit.effects))

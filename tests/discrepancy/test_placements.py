@@ -72,6 +72,17 @@ def test_joints_are_moved_where_nothing_else_explains_nearly_all(laboratory):
     assert with_placements(tilted, start, scan(tilted, start.fit, start.noise)) is start
 
 
+@pytest.mark.scenario
+def test_what_promises_less_than_it_explains_is_no_placement(laboratory):
+    """A first joint that is off by much turns gravity, as if both joints behind it were elsewhere."""
+    bench = laboratory.bench(laboratory.record([("joint_offset", "hip", [], {"offset": 0.6})]))
+    start = settle(bench, bench.effects)
+    candidates = scan(bench, start.fit, start.noise)
+    assert candidates[0].effect.name == "base_tilt"
+    assert candidates[0].gain < PROMISED * start.fit.excess
+    assert with_placements(bench, start, candidates) is start
+
+
 def test_a_model_that_has_one_is_not_given_it_again(nothing_missing, monkeypatch):
     """Nor another one that explains too little."""
     bench, start = nothing_missing
