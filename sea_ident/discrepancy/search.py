@@ -169,10 +169,10 @@ def search(
         if sought < MOST_EFFECTS and not _lost(now, before, sought, candidates):
             smallest = np.maximum(SMALLEST_SHARE, BESIDE_ANOTHER * largest)
             step = next_effect(bench, now, candidates, tests, smallest, tried)
-            both = both_at_once(bench, now, candidates, None if step is None else step[0], tests)
-            if both is not None:
-                step = both
-                added.append(both[1])
+            single = None if step is None else step[0]
+            # other data spoke against one of both
+            both = None if ruled_out else both_at_once(bench, now, candidates, single, tests)
+            step = step if both is None else both
         if step is None and waits:
             last, waits = now, False
             now = _improved(bench, now, len(added), tried, ruled_out)
@@ -182,13 +182,14 @@ def search(
             break
         new, p_value = step
         largest = np.maximum(largest, visible_changes(bench, now.fit, new))
-        added.append(p_value)
+        more = len(new.effects) - len(now.fit.effects)
+        added.extend([p_value] * more)
         before = now
         now = _settled(bench, settle_again(bench, new))
         waits = now.fit.statistic > FAR_FROM_RIGHT * now.fit.dof and _possible(bench, now, len(added))
         now = _formed(bench, now) if waits else _improved(bench, now, len(added), tried, ruled_out)
         if not _possible(bench, now, len(added)):
-            added.pop()
+            del added[-more:]
             now = before
             break
     for as_one in (as_one_zero, as_one_push, as_one_delay):

@@ -61,10 +61,19 @@ def test_they_stay_when_what_is_not_needed_is_taken_out(with_a_constant):
     """Without the constant an element that sticks would stand in for it, and pull the wrong way."""
     bench, start = with_a_constant
     found = search(bench, bench.effects, start=start)
+    assert len(found.p_values) == found.added == 2
     assert {(effect.name, effect.joint) for effect in found.effects} == {
         ("spring_offset", JOINT),
         ("spring_hysteresis", JOINT),
     }
+
+
+def test_neither_stays_where_they_are_not_possible(with_a_constant, monkeypatch):
+    bench, start = with_a_constant
+    monkeypatch.setattr("sea_ident.discrepancy.search._possible", lambda *given: False)
+    found = search(bench, bench.effects, start=start)
+    assert found.p_values == ()
+    assert found.final.fit.effects == start.fit.effects
 
 
 def test_one_of_them_alone_is_told_alone(laboratory, nothing_missing):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from sea_ident.discrepancy import search as search_module
 from sea_ident.discrepancy.one_push import as_one_push
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import make_effect
@@ -43,8 +44,22 @@ def test_two_on_the_wrong_links_are_one_on_the_right_one(pushed):
     assert after.fit.parameters["knee.external_force_z"] == pytest.approx(3.0, abs=0.3)
 
 
-def test_pushes_at_other_times_or_other_effects_stay(pushed):
+def test_a_search_tells_one(pushed, monkeypatch):
+    """Where nothing more is found, and what is there is not exchanged."""
+    bench, start = pushed
+    now = fitted(pushed, push("hip"), push("ankle", 0.6, 1.2), push("ankle", point_x=0.01, point_z=0.01))
+    monkeypatch.setattr(search_module, "next_effect", lambda *given: None)
+    monkeypatch.setattr(search_module, "exchange", lambda bench, now, *given: now)
+    begun = search_module.Selection(start, now, 3, (0.0, 0.0, 0.0))
+    found = search_module.search(bench, bench.effects, begun)
+    assert [effect.joint for effect in found.effects] == ["knee", "ankle"]
+    assert len(found.p_values) == found.added == 2
+
+
+def test_pushes_at_other_times_or_other_effects_stay(pushed, monkeypatch):
+    """Nothing is tried in their place."""
     bench, _ = pushed
+    monkeypatch.setattr("sea_ident.discrepancy.one_push.side_by_side", None)
     now = fitted(pushed, push("knee"), make_effect("torque_offset", "hip"), push("ankle", 0.6, 1.2))
     after, left = as_one_push(bench, now, 3)
     assert after is now

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.data import EquationKind
 from sea_ident.discrepancy.fit import Known
 from sea_ident.discrepancy.possible_springs import without_cubic
 from sea_ident.discrepancy.settle import settle
@@ -100,3 +101,15 @@ def test_next_to_nothing_that_is_known_at_a_spring_is_no_measure_of_its_equation
     for joint in bench.robot.joint_names:
         name = f"{joint}.spring_stiffness"
         assert more.parameters[name] == pytest.approx(bench.first_fit.parameters[name], rel=1e-3)
+
+
+def test_samples_of_the_joints_are_left_out_at_which_friction_jumps_elsewhere(laboratory):
+    """Those in which a torque that comes late passes a reversal, at its joint or at all of them; no link equation."""
+    for joint, joints in (("knee", {"knee"}), (None, {"hip", "knee", "ankle"})):
+        bench = laboratory.bench(laboratory.record())
+        before = bench._left_out.copy()
+        bench.release([make_effect("torque_delay", joint, delay=0.02)])
+        more = np.any(bench._left_out & ~before, axis=0)
+        equations = bench.data.equations
+        assert {equations[e].joint for e in np.flatnonzero(more)} == joints
+        assert all(equations[e].kind is not EquationKind.LINK for e in np.flatnonzero(more))
