@@ -16,7 +16,7 @@ from sea_ident.discrepancy.judge import EQUALLY_GOOD, at_a_bound, penalty, signi
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import Settled, settle_again
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.position_delay import PositionDelay
 from sea_ident.effects.signal import DelayEffect
 from sea_ident.effects.torque_delay import TorqueDelay
@@ -104,10 +104,12 @@ def _is_at_a_joint(effect: Effect, whole: DelayEffect) -> bool:
 
 
 def common_delays(robot: Robot) -> tuple[TorqueDelay | PositionDelay, ...]:
-    """All torques late, and all link encoders.
+    """All torques late, and all link encoders, where the library has delays.
 
     Where no joint has a spring the one is the other, backwards; where there is one joint both are its own.
     """
     if robot.n < 2:
         return ()
-    return (TorqueDelay(), PositionDelay()) if any(joint.elastic for joint in robot.joints) else (TorqueDelay(),)
+    elastic = any(joint.elastic for joint in robot.joints)
+    delays = (TorqueDelay(), PositionDelay()) if elastic else (TorqueDelay(),)
+    return tuple(delay for delay in delays if delay.name in effect_classes())

@@ -16,7 +16,7 @@ from sea_ident.discrepancy.physics import physical
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import Settled
 from sea_ident.discrepancy.slips import with_its_second_element
-from sea_ident.effects import Effect
+from sea_ident.effects import Effect, effect_classes
 from sea_ident.effects.offset import Offset
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.effects.spring_offset import SpringOffset
@@ -68,6 +68,8 @@ def both_at_once(
 def _springs(bench: Bench, now: Settled, candidates: Sequence[Candidate], tests: int) -> list[str]:
     """Joints in whose springs either explains something, and the model has neither."""
     fit, noise = now.fit, now.noise
+    if not {SpringHysteresis.name, SpringOffset.name} <= effect_classes().keys():
+        return []
     taken = {effect.joint for effect in fit.effects if isinstance(effect, SpringHysteresis | SpringOffset | Offset)}
     seen = {
         candidate.effect.joint

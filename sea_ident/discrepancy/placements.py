@@ -10,6 +10,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate
 from sea_ident.discrepancy.explained_by_one import Added, explained_by_one
 from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.effects import effect_classes
 from sea_ident.effects.joint_placement import JointPlacement
 from sea_ident.side_by_side import side_by_side
 
@@ -43,6 +44,8 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
     excess = start.fit.excess
     promised = candidates[0].gain if candidates else 0.0
     if promised >= PROMISED * excess or start.fit.statistic < PLAIN * start.fit.dof:
+        return start
+    if JointPlacement.name not in effect_classes():
         return start
     present = {effect.joint for effect in start.fit.effects if isinstance(effect, JointPlacement)}
     places = [place for place in JointPlacement.instances(bench.robot) if place.joint not in present]

@@ -12,7 +12,7 @@ from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.common_delays import PROMISED, as_one_delay, common_delays, with_a_common_delay
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.settle import settle, settle_again
-from sea_ident.effects import make_effect
+from sea_ident.effects import effect_classes, make_effect
 from sea_ident.estimation import identify
 from sea_ident.exceptions import SeaIdentWarning
 from tests.effects.chains import rigid_chain
@@ -108,6 +108,12 @@ def test_it_is_not_asked_for_where_one_effect_explains_all(late, nothing_missing
 def test_a_base_that_leans_is_no_delay(laboratory):
     asked = on_the_bench(laboratory, ("base_tilt", None, [0.03, 0.02], {}))
     assert with_a_common_delay(*asked, 1000) is asked[1]
+
+
+def test_a_library_without_delays_has_none_of_all(leg, monkeypatch):
+    less = {name: kind for name, kind in effect_classes().items() if name != "torque_delay"}
+    monkeypatch.setattr(common_delays_module, "effect_classes", lambda: less)
+    assert [effect.name for effect in common_delays(leg)] == ["position_delay"]
 
 
 def test_robots_without_springs_have_one_delay_of_all(leg):

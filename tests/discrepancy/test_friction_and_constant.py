@@ -11,7 +11,7 @@ from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.refit import refitted
 from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle
-from sea_ident.effects import make_effect
+from sea_ident.effects import effect_classes, make_effect
 from sea_ident.estimation import identify
 from sea_ident.exceptions import SeaIdentWarning
 
@@ -38,7 +38,7 @@ def single(bench, now, effect):
     return refitted(bench, now.fit.effects, best.effect, (), now.noise, now.fit.parameters)
 
 
-def test_both_are_found_where_no_single_one_is(with_a_constant):
+def test_both_are_found_where_no_single_one_is(with_a_constant, monkeypatch):
     """To within their standard deviations; the best single effect is another one, and leaves most."""
     bench, start = with_a_constant
     eccentric = single(bench, start, make_effect("encoder_eccentricity", JOINT))
@@ -48,6 +48,10 @@ def test_both_are_found_where_no_single_one_is(with_a_constant):
     assert p_value < FAMILY_LEVEL
     assert [effect.name for effect in found.effects[-2:]] == ["spring_offset", "spring_hysteresis"]
     assert found.statistic < 1.3 * found.dof
+    with monkeypatch.context() as patched:
+        less = {name: kind for name, kind in effect_classes().items() if name != "spring_hysteresis"}
+        patched.setattr("sea_ident.discrepancy.friction_and_constant.effect_classes", lambda: less)
+        assert both_at_once(bench, start, candidates, eccentric, 1000) is None
     others = [candidate for candidate in candidates if candidate.effect.joint != JOINT]
     assert both_at_once(bench, start, others, eccentric, 1000) is None
     assert found.effects[-1].elements == 1
