@@ -38,7 +38,7 @@ def scored(root: Path, planted: tuple[Planted, ...], diagnosis: dict, row: str =
 
 
 def said(
-    *names: tuple[str, str],
+    *names: tuple[str, str | None],
     verdict: str = "named",
     alternatives: tuple[tuple[str, str], ...] = (),
     seconds: float = 1.0,
@@ -65,6 +65,17 @@ def test_the_gap_of_what_drifts_is_that_from_period_to_period(tmp_path: Path) ->
         for planted in ((drift,), (drift, RIPPLE))
     ]
     assert scores == pytest.approx([0.8, 0.3])
+
+
+@pytest.mark.parametrize("joint", ["knee", None])
+def test_a_delay_of_one_joint_is_none_of_all(tmp_path: Path, joint: str | None) -> None:
+    """Nor are delays of all joints, told one by one, that of all."""
+    late = Planted("torque_delay", joint, "library", 0.01, {}, gap=0.02, torque_share=0.02)
+    joints = [None] if joint else ["hip", "knee", "ankle"]
+    score = scored(tmp_path, (late,), said(*(("torque_delay", other) for other in joints)))
+    assert score.finder(late) is None
+    assert len(score.false()) == len(joints)
+    assert scored(tmp_path, (late,), said(("torque_delay", joint))).finder(late) is not None
 
 
 @pytest.mark.parametrize("name", [("torque_ripple", "hip"), ("torque_offset", "knee")])

@@ -17,6 +17,12 @@ from sea_ident.discrepancy.settle import Settled
 from sea_ident.effects import Effect
 from sea_ident.side_by_side import side_by_side
 
+PROMISED = 0.95
+"""Share of the excess from which on one effect that promises it is the one that is missing [-]."""
+
+NEARLY_ALL = 0.8
+"""Share of the excess that several effects, or one at all joints, must explain [-]."""
+
 HOPEFUL = 0.3
 """Share of the excess that a first step must promise [-]."""
 
@@ -25,6 +31,17 @@ MOST = 4
 
 ROUNDS = 3
 """Rounds in which an effect and what it depends on follow each other."""
+
+
+def one_promises_all(start: Settled, candidates: Sequence[Candidate]) -> bool:
+    """Whether the best effect promises by its first step what a model leaves."""
+    return bool(candidates) and candidates[0].gain >= PROMISED * start.fit.excess
+
+
+def explains_nearly_all(start: Settled, gain: float, candidates: Sequence[Candidate]) -> bool:
+    """Whether a drop of the statistic is nearly all that a model leaves, and more than the best effect promises."""
+    promised = candidates[0].gain if candidates else 0.0
+    return gain > max(NEARLY_ALL * start.fit.excess, promised)
 
 
 def explained_by_one(bench: Bench, start: Settled, candidates: Sequence[Candidate]) -> float:

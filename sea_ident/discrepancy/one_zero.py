@@ -1,15 +1,12 @@
 """Two wrong zeros of a joint that are one: those of its two encoders, and that of its angle.
 
 Both encoders are off where the angle is, so that each of the three is the sum of the two others. What turns the first
-joint turns gravity. A search adds one after the other, and may end with two where one is simpler.
+joint turns gravity.
 """
 
 from collections.abc import Mapping
-from itertools import combinations
 
 from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.judge import penalty
-from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.base_tilt import BaseTilt
 from sea_ident.effects.encoder_offset import EncoderOffset
@@ -19,37 +16,18 @@ from sea_ident.effects.offset import Offset
 from sea_ident.effects.spring_offset import SpringOffset
 
 
-def as_one_zero(bench: Bench, now: Settled, added: int) -> tuple[Settled, list[int]]:
-    """A model with one wrong zero in the place of two that were added, where that does as well for its price.
+def one_zero(bench: Bench, one: Effect, two: Effect, parameters: Mapping[str, float]) -> Effect | None:
+    """The zero that two effects may be.
 
     Args:
         bench: the recording.
-        now: the model.
-        added: number of effects added, its last ones.
+        one: the first.
+        two: the second.
+        parameters: of the model that both are in, by name.
 
     Returns:
-        The model, and which of the effects that were added are left; the first of two stands for both.
+        The zero, about as large as it is; None where they are no zeros of one joint.
     """
-    left, found = list(range(added)), True
-    while found:
-        fit, found = now.fit, False
-        first = len(fit.effects) - len(left)
-        for one, two in combinations(range(first, len(fit.effects)), 2):
-            single = _single(bench, fit.effects[one], fit.effects[two], fit.parameters)
-            if single is None:
-                continue
-            others = [single if k == one else e for k, e in enumerate(fit.effects) if k != two]
-            new = bench.refine(others, now.noise, start=fit.parameters, only=len(bench.effects))
-            spared = sum(penalty(fit.effects[k], bench) for k in (one, two)) - penalty(new.effects[one], bench)
-            if new.statistic < fit.statistic + fit.unit * spared:
-                now, found = settle_again(bench, new), True
-                left.pop(two - first)
-                break
-    return now, left
-
-
-def _single(bench: Bench, one: Effect, two: Effect, parameters: Mapping[str, float]) -> Effect | None:
-    """The zero that two effects may be; None where they are none of one joint."""
     robot = bench.robot
     zeros = [effect for effect in (one, two) if isinstance(effect, Offset | SpringOffset)]
     tilted = any(isinstance(effect, BaseTilt) for effect in (one, two))

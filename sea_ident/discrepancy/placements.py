@@ -8,20 +8,14 @@ from collections.abc import Sequence
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate
-from sea_ident.discrepancy.explained_by_one import Added, explained_by_one
+from sea_ident.discrepancy.explained_by_one import Added, explained_by_one, explains_nearly_all, one_promises_all
 from sea_ident.discrepancy.settle import Settled, settle_again
 from sea_ident.effects import effect_classes
 from sea_ident.effects.joint_placement import JointPlacement
 from sea_ident.side_by_side import side_by_side
 
-PROMISED = 0.95
-"""Share of the excess from which on another effect that promises it is the one that is missing [-]."""
-
 PLAIN = 10.0
 """Statistic over degrees of freedom from which on it is asked: less is explained by many ways of several joints [-]."""
-
-NEARLY_ALL = 0.8
-"""Share of the excess that joints must explain, and more than any other effect promises [-]."""
 
 AS_LITTLE = 2.0
 """Times what joints leave that one effect, fitted, may leave to be what is missing after all [-]."""
@@ -42,8 +36,7 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
         The model, settled.
     """
     excess = start.fit.excess
-    promised = candidates[0].gain if candidates else 0.0
-    if promised >= PROMISED * excess or start.fit.statistic < PLAIN * start.fit.dof:
+    if one_promises_all(start, candidates) or start.fit.statistic < PLAIN * start.fit.dof:
         return start
     if JointPlacement.name not in effect_classes():
         return start
@@ -58,7 +51,7 @@ def with_placements(bench: Bench, start: Settled, candidates: Sequence[Candidate
             break
         del places[best]
         now = settle_again(bench, settle_again(bench, new).fit)
-    if excess - now.fit.excess <= max(NEARLY_ALL * excess, promised):
+    if not explains_nearly_all(start, excess - now.fit.excess, candidates):
         return start
     left_by_one = max(excess - explained_by_one(bench, start, candidates), 0.0)
     return start if left_by_one <= AS_LITTLE * now.fit.excess else now

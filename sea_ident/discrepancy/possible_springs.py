@@ -13,7 +13,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.search import Selection
+from sea_ident.discrepancy.search import NOT_ASKED, Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
 from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
@@ -67,7 +67,7 @@ def begun_with_zeros(bench: Bench, zeros: Sequence[Offset], start: Settled | Non
     start = settle(bench, bench.effects) if start is None else start
     fit = bench.fit((*start.fit.effects, *zeros), None, tangents=False)
     final = settle_again(bench, settle_again(bench, fit).fit)
-    return Selection(start, final, len(zeros), (0.0,) * len(zeros))
+    return Selection(start, final, len(zeros), (NOT_ASKED,) * len(zeros))
 
 
 def left_without_cubic(robot: Robot, stiffness: Mapping[str, float]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from sea_ident.discrepancy.as_described import as_described
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key
-from sea_ident.discrepancy.common_delays import as_one_delay, with_a_common_delay
+from sea_ident.discrepancy.common_delays import with_a_common_delay
 from sea_ident.discrepancy.edges import sharpened, without_another
 from sea_ident.discrepancy.exchange import Tried, exchange
 from sea_ident.discrepancy.fit import Fit, Solution
@@ -36,8 +36,7 @@ from sea_ident.discrepancy.next_effect import (
     next_effect,
     visible_changes,
 )
-from sea_ident.discrepancy.one_push import as_one_push
-from sea_ident.discrepancy.one_zero import as_one_zero
+from sea_ident.discrepancy.one_for_two import one_for_two
 from sea_ident.discrepancy.physics import bends_another, physical, possible
 from sea_ident.discrepancy.placements import with_placements
 from sea_ident.discrepancy.powers import with_their_powers
@@ -60,6 +59,9 @@ leave something at certain times of a period too, and a push fits there [-], ...
 BEYOND_DOUBT = 0.02
 """... unless it leaves less than this share of the excess without it: no other form is so alike a push that comes and
 goes, and without it nothing else is told [-]."""
+
+NOT_ASKED = float("nan")
+"""Significance of what is in a model before it is asked for one: that is done beside all that is found."""
 
 WIDER_BEFORE = 3
 """Effects before which it is asked whether signals of all joints are late, or joints elsewhere."""
@@ -161,7 +163,7 @@ def search(
                 wider = _improved(bench, wider, len(added) + more, tried, ruled_out)
                 if _possible(bench, wider, len(added) + more):
                     now, before = wider, now
-                    added.extend([0.0] * more)
+                    added.extend([NOT_ASKED] * more)
                     largest = np.maximum(largest, _largest_changes(bench, now.fit, len(added)))
                     continue
         step = None
@@ -192,13 +194,25 @@ def search(
             del added[-more:]
             now = before
             break
-    for as_one in (as_one_zero, as_one_push, as_one_delay):
-        now, left = as_one(bench, now, len(added))
-        added = [added[k] for k in left]
+    now, left = one_for_two(bench, now, len(added))
+    added = [added[k] for k in left]
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
     now, added = _eliminate(bench, now, added, tests)
+    added = _asked(bench, now, added, tests)
     now = settled_in_form(bench, now, len(now.fit.effects) - len(added), by_the_first_element)
     return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
+
+
+def _asked(bench: Bench, now: Settled, added: Sequence[float], tests: int) -> list[float]:
+    """Significance of each of the last effects of a model, by what it does there where it was not asked for it yet."""
+    fit, noise, out = now.fit, now.noise, list(added)
+    for k in np.flatnonzero(np.isnan(added)):
+        position = len(fit.effects) - len(added) + int(k)
+        others = [e for i, e in enumerate(fit.effects) if i != position]
+        without = bench.refine(others, noise, start=fit.parameters, only=len(bench.effects))
+        columns = max(len(fit.effects[position].columns(bench.robot)), 1)
+        out[k] = significance(without.statistic - fit.statistic, columns, tests, without, noise)
+    return out
 
 
 def _described(bench: Bench, now: Settled, added: int) -> int:
@@ -214,7 +228,7 @@ def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:
         # encoders that are late at all links are as good as viscous friction there, but for what tells them apart
         late = with_a_common_delay(bench, start, (), 1)
         if late is not start and late.fit.statistic / late.fit.dof < now.fit.statistic / now.fit.dof:
-            return late, [0.0]
+            return late, [NOT_ASKED]
     count = len(now.fit.effects) - len(start.fit.effects)
     now, added = _eliminate(bench, now, [0.0] * count, count, fewest=0)
     positions = range(len(now.fit.effects) - len(added), len(now.fit.effects))

@@ -39,11 +39,7 @@ def by_the_first_element(bench: Bench, fit: Fit, noise: NoiseFloor, position: in
     narrow = fit.slice_of(position, bench.counts(fit.effects)).start
     if abs(fit.values[narrow]) > NOT_SEEN * fit.unit**0.5 * fit.std(narrow):
         return fit
-    effects = list(fit.effects)
-    effects[position] = replace(effect, slip=WIDER * effect.slip)
-    other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
-    slack = len(bench.slack_links(other)) > len(bench.slack_links(fit))
-    return fit if slack or other.statistic - fit.statistic > EQUALLY_GOOD * fit.unit else other
+    return _unless_worse(bench, fit, noise, position, replace(effect, slip=WIDER * effect.slip))
 
 
 def without_what_sticks(bench: Bench, fit: Fit, noise: NoiseFloor, position: int) -> Fit:
@@ -63,10 +59,7 @@ def without_what_sticks(bench: Bench, fit: Fit, noise: NoiseFloor, position: int
         return fit
     if not any(isinstance(e, SpringOffset | Offset) and e.joint == effect.joint for e in fit.effects):
         return fit
-    effects = list(fit.effects)
-    effects[position] = replace(effect, elements=1)
-    other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
-    return fit if other.statistic - fit.statistic > EQUALLY_GOOD * fit.unit else other
+    return _unless_worse(bench, fit, noise, position, replace(effect, elements=1))
 
 
 def with_its_second_element(bench: Bench, fit: Fit, noise: NoiseFloor) -> Fit:
@@ -79,3 +72,11 @@ def with_its_second_element(bench: Bench, fit: Fit, noise: NoiseFloor) -> Fit:
     found = other.effects[-1]
     slips = isinstance(found, SpringHysteresis) and bool(slips_here(bench, found)[-1])
     return other if slips and fit.statistic - other.statistic > EQUALLY_GOOD * other.unit else fit
+
+
+def _unless_worse(bench: Bench, fit: Fit, noise: NoiseFloor, position: int, form: SpringHysteresis) -> Fit:
+    """A model with friction in another form; the same one where that leaves more, or a spring without stiffness."""
+    effects = [form if k == position else effect for k, effect in enumerate(fit.effects)]
+    other = bench.refine(effects, noise, start=fit.parameters, only=len(bench.effects))
+    slack = len(bench.slack_links(other)) > len(bench.slack_links(fit))
+    return fit if slack or other.statistic - fit.statistic > EQUALLY_GOOD * fit.unit else other

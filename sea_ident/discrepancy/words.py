@@ -16,7 +16,6 @@ from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects.base import titled
 from sea_ident.exceptions import DivergenceError, SeaIdentError
-from sea_ident.plain import plain
 from sea_ident.robot import Robot
 
 FEW_PERIODS = 10
@@ -309,7 +308,7 @@ def _not_compared(facts: Facts, standing: Standing) -> str:
 
 def _percent(share: float) -> str:
     """A share with two digits, and no power of ten."""
-    return f"{100 * share:.0f} %" if share >= 0.1 else f"{plain(100 * share)} %"
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
 def _part(facts: Facts) -> float | None:

@@ -9,8 +9,12 @@ import pytest
 from sea_ident.discrepancy import common_delays as common_delays_module
 from sea_ident.discrepancy import diagnose
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.common_delays import PROMISED, as_one_delay, common_delays, with_a_common_delay
+from sea_ident.discrepancy.common_delays import common_delays, with_a_common_delay
+from sea_ident.discrepancy.explained_by_one import PROMISED
+from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.one_for_two import one_for_two
 from sea_ident.discrepancy.refit import refitted
+from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import effect_classes, make_effect
 from sea_ident.estimation import identify
@@ -58,23 +62,31 @@ def test_the_delays_of_some_joints_are_theirs(laboratory):
     bench, start, _ = asked
     assert with_a_common_delay(*asked, 1000) is start
     now = with_their_delays(bench, start, "hip", "ankle")
-    assert as_one_delay(bench, now, 2) == (now, [0, 1])
+    assert one_for_two(bench, now, 2) == (now, [0, 1])
 
 
 def test_delays_that_were_found_one_by_one_are_one(late):
-    """What stands between them stays; one that is a little better than that of a joint is not enough."""
+    """What stands between them stays."""
     bench, start, _ = late
     offset = make_effect("torque_offset", "hip")
     delays = [make_effect("torque_delay", joint, delay=0.005) for joint in ("hip", "knee", "ankle")]
     effects = (*start.fit.effects, delays[0], offset, *delays[1:])
     new = bench.refine(effects, start.noise, start=start.fit.parameters, only=len(bench.effects))
-    after, left = as_one_delay(bench, settle_again(bench, new), 4)
+    after, left = one_for_two(bench, settle_again(bench, new), 4)
     assert left == [0, 1]
     found, other = after.fit.effects[len(bench.effects) :]
     assert (found.name, found.joint) == ("torque_delay", None)
     assert found.delay == pytest.approx(0.006, abs=8e-4)
     assert other == offset
-    assert as_one_delay(bench, after, 2) == (after, [0, 1])
+    assert one_for_two(bench, after, 2) == (after, [0, 1])
+
+
+def test_a_search_asks_for_its_significance(late):
+    bench, start, _ = late
+    found = search(bench, bench.effects, start=start)
+    assert [(effect.name, effect.joint) for effect in found.effects] == [("torque_delay", None)]
+    (p_value,) = found.p_values
+    assert 0.0 < p_value < FAMILY_LEVEL
 
 
 def test_what_is_there_is_not_asked_for_again(late, monkeypatch):
@@ -93,7 +105,7 @@ def test_it_is_not_asked_for_where_one_effect_explains_all(late, nothing_missing
     assert with_a_common_delay(bench, start, [], 1000) is not start
     more = SimpleNamespace(gain=1.001 * (start.fit.statistic - whole.statistic))
     with monkeypatch.context() as patched:
-        patched.setattr(common_delays_module, "PROMISED", 2.0)
+        patched.setattr(common_delays_module, "one_promises_all", lambda *given: False)
         assert with_a_common_delay(bench, start, [more], 1000) is start
         patched.setattr(common_delays_module, "explained_by_one", lambda *given: more.gain)
         assert with_a_common_delay(bench, start, [], 1000) is start

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import diagnose
-from sea_ident.discrepancy.one_zero import _single, as_one_zero
+from sea_ident.discrepancy.one_for_two import one_for_two
+from sea_ident.discrepancy.one_zero import one_zero
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 from sea_ident.estimation import identify
@@ -52,7 +53,7 @@ def test_two_that_are_one(laboratory, truth, joint, pair, single, size):
     added = [make_effect(name) if name == "base_tilt" else zero(name, joint, sizes[name]) for name in pair]
     bench, now = fitted(laboratory, recording, *added)
     assert now.fit.statistic < 1.5 * now.fit.dof
-    after, left = as_one_zero(bench, now, 2)
+    after, left = one_for_two(bench, now, 2)
     assert left == [0]
     (found,) = after.fit.effects[len(bench.effects) :]
     assert (found.name, found.joint) == (single, joint)
@@ -64,7 +65,7 @@ def test_two_that_are_one(laboratory, truth, joint, pair, single, size):
 def test_two_that_are_two_stay(laboratory):
     recording = shown(laboratory.record(), "knee", q=0.05, theta=-0.02)
     bench, now = fitted(laboratory, recording, zero("encoder_offset"), zero("motor_encoder_offset", offset=-0.02))
-    after, left = as_one_zero(bench, now, 2)
+    after, left = one_for_two(bench, now, 2)
     assert after is now
     assert left == [0, 1]
     names = [effect.offset for effect in after.fit.effects[len(bench.effects) :]]
@@ -85,10 +86,10 @@ def test_what_is_not_of_one_joint_is_left(nothing_missing, pair):
     """Gravity turns with the first joint only."""
     bench, start = nothing_missing
     effects = tuple(make_effect(name, joint) for name, joint in pair)
-    assert _single(bench, *effects, start.fit.parameters) is None
+    assert one_zero(bench, *effects, start.fit.parameters) is None
     fit = bench.predicted((*start.fit.effects, *effects), start.fit.parameters)
     now = Settled(fit, start.noise)
-    after, left = as_one_zero(bench, now, 2)
+    after, left = one_for_two(bench, now, 2)
     assert after is now
     assert left == [0, 1]
 

@@ -9,7 +9,8 @@ import pytest
 
 from sea_ident.discrepancy import diagnose
 from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.placements import PROMISED, with_placements
+from sea_ident.discrepancy.explained_by_one import PROMISED
+from sea_ident.discrepancy.placements import with_placements
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import make_effect
 from sea_ident.effects.joint_placement import JointPlacement

@@ -126,9 +126,8 @@ def test_an_element_that_sticks_is_not_added(slipping, monkeypatch):
 
     monkeypatch.setattr(bench, "refine", better)
     assert with_its_second_element(bench, one, start.noise) is one
-    assert (
-        with_its_second_element(bench, beside_a_constant(bench, start, 0.2 * SLIP, elements=1), start.noise) is not one
-    )
+    short = beside_a_constant(bench, start, 0.2 * SLIP, elements=1)
+    assert with_its_second_element(bench, short, start.noise) is not short
 
 
 def test_an_element_that_slips_stays(laboratory, monkeypatch):

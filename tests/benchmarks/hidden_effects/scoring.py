@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sea_ident.effects.base import AT_ALL_JOINTS
 from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.catalogue import ENTRIES
 from tests.benchmarks.hidden_effects.diagnose_case import RESULT
@@ -76,6 +77,8 @@ class Score:
         if equal and self._is_last(planted.joint):
             return True
         joint_fits = planted.joint is None or name[1] in (planted.joint, None)
+        if name[0] in AT_ALL_JOINTS:  # a delay of one joint is none of all, and delays of several are not one
+            joint_fits = name[1] == planted.joint
         entry = ENTRIES.get((planted.effect, planted.form))
         accepted = (planted.effect, *(entry.accepted if entry else ()))
         return joint_fits and name[0] in accepted

@@ -1,9 +1,9 @@
-"""Two pushes at the same time that are one on another link are told as one."""
+"""Two pushes at the same time that are one on another link are told as one, and so are delays of joints."""
 
 import pytest
 
 from sea_ident.discrepancy import search as search_module
-from sea_ident.discrepancy.one_push import as_one_push
+from sea_ident.discrepancy.one_for_two import one_for_two
 from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import make_effect
 
@@ -17,7 +17,7 @@ def push(joint, start=START, stop=STOP, **point):
 
 @pytest.fixture(scope="module")
 def pushed(laboratory):
-    """A leg that is pushed at its knee, by twice as much at a time at its ankle."""
+    """A leg that is pushed at its knee, and at its ankle at another time."""
     planted = [(push("knee"), [4.0, 0.0, 3.0]), (push("ankle", 0.6, 1.2), [6.0, 0.0, 0.0])]
     bench = laboratory.bench(laboratory.record(planted, periods=6))
     return bench, settle(bench, bench.effects)
@@ -34,7 +34,7 @@ def test_two_on_the_wrong_links_are_one_on_the_right_one(pushed):
     beside = push("ankle", 0.6, 1.2)
     now = fitted(pushed, push("hip"), beside, push("ankle", point_x=0.01, point_z=0.01))
     assert now.fit.statistic < 3.0 * now.fit.dof
-    after, left = as_one_push(bench, now, 3)
+    after, left = one_for_two(bench, now, 3)
     assert left == [0, 1]
     found, other = after.fit.effects[len(bench.effects) :]
     assert found.joint == "knee"
@@ -59,9 +59,9 @@ def test_a_search_tells_one(pushed, monkeypatch):
 def test_pushes_at_other_times_or_other_effects_stay(pushed, monkeypatch):
     """Nothing is tried in their place."""
     bench, _ = pushed
-    monkeypatch.setattr("sea_ident.discrepancy.one_push.side_by_side", None)
+    monkeypatch.setattr("sea_ident.discrepancy.one_for_two.side_by_side", None)
     now = fitted(pushed, push("knee"), make_effect("torque_offset", "hip"), push("ankle", 0.6, 1.2))
-    after, left = as_one_push(bench, now, 3)
+    after, left = one_for_two(bench, now, 3)
     assert after is now
     assert left == [0, 1, 2]
 
@@ -72,6 +72,6 @@ def test_two_that_no_other_does_for_stay(pushed, laboratory):
     bench = laboratory.bench(laboratory.record(planted, periods=6))
     start = settle(bench, bench.effects)
     now = fitted((bench, start), push("hip"), push("ankle"))
-    after, left = as_one_push(bench, now, 2)
+    after, left = one_for_two(bench, now, 2)
     assert left == [0, 1]
     assert after is now
