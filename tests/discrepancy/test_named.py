@@ -9,6 +9,7 @@ from sea_ident.discrepancy import named
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import conclude
 from sea_ident.discrepancy.confirm import Confirmed
+from sea_ident.discrepancy.findings import Alternative
 from sea_ident.discrepancy.named import _as_seen, _shift_by_the_mean, named_effect, named_effects
 from sea_ident.discrepancy.powers import with_open_powers
 from sea_ident.discrepancy.search import Selection
@@ -16,6 +17,7 @@ from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.trend import TrendTest, compare_periods
 from sea_ident.discrepancy.trend_within import within_periods
 from sea_ident.discrepancy.uncertainty import uncertainties
+from sea_ident.discrepancy.unseen import Beside
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter
 
@@ -121,3 +123,24 @@ def test_a_torque_constant_may_have_been_as_described_before_it_drifted_or_in_th
     # of friction the model has parameters
     friction = replace(trend, effect=make_effect("friction_drift", "hip"), values=np.array([0.0, 1.0]))
     assert not np.any(_shift_by_the_mean(less, now, friction))
+
+
+def test_what_an_effect_may_be_instead_is_not_beside_it(nothing_missing, monkeypatch):
+    """A better model with an effect beside it adds to what a parameter may be off by; one that it may be does not."""
+    bench, start = nothing_missing
+    effect = make_effect("torque_offset", "hip")
+    now = Settled(bench.fit((*start.fit.effects, effect), start.noise, start=start.fit.parameters), start.noise)
+    count = len(now.fit.columns) + len(now.fit.free_shapes)
+    other = Beside(make_effect("motor_encoder_offset", "hip"), np.zeros(count), np.full(count, 3.0), True)
+    monkeypatch.setattr(named, "beside_others", lambda *_: (other,))
+    position = len(start.fit.effects)
+
+    def told(*instead):
+        alternatives = {position: tuple(Alternative(*which, 1.0) for which in instead)}
+        (found,) = named_effects(bench, Selection(start, now, 1, (0.0,)), alternatives, None)
+        return found.parameters[0].std
+
+    alone = told(("motor_encoder_offset", "hip"))
+    assert alone < 0.1
+    assert told() == pytest.approx(np.hypot(alone, 3.0))
+    assert told(("motor_encoder_offset", "knee")) == told(("encoder_offset", "hip")) == told()
