@@ -73,6 +73,18 @@ def test_what_a_description_gives_and_no_link_has_is_not_told(described, monkeyp
     assert _as_described(bench, start) == (start, [])
 
 
+def test_encoders_of_links_that_are_late_at_all_joints_are_no_friction_there(described):
+    """The friction that is described fits nearly as well."""
+    bench, start = with_friction_at(described, planted=[("position_delay", None, [], {"delay": 2e-4})])
+    rubbing = as_described(bench, start).fit
+    assert rubbing.statistic < 0.01 * start.fit.statistic
+    now, added = _as_described(bench, start)
+    (late,) = now.fit.effects[len(bench.effects) :]
+    assert (late.name, late.joint, len(added)) == ("position_delay", None, 1)
+    assert late.delay == pytest.approx(2e-4, rel=0.01)
+    assert now.fit.statistic < 1.1 * now.fit.dof < rubbing.statistic
+
+
 def test_what_explains_little_is_not_where_a_search_begins(described):
     bench, start = with_friction_at(described, planted=[("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})])
     assert as_described(bench, start) is start
