@@ -243,15 +243,20 @@ class ParameterFits(Tangents):
         first = self.first_stiffness
         return np.where(first > 0.0, first / np.maximum(stiffness, LEAST_STIFFNESS * first + 1e-300), 1.0)
 
-    def slack_links(self, fit: Fit) -> list[int]:
-        """Link equations of springs that have lost their stiffness in a fit: they explain nothing, at no price."""
-        tight = self._scaled_links(self.stiffness_of(fit))
+    def slack_links(self, fit: Fit, below: float = LEAST_STIFFNESS) -> list[int]:
+        """Link equations of springs that have lost their stiffness in a fit: they explain nothing, at no price.
+
+        Args:
+            fit: the fit.
+            below: share of the stiffness of the first fit that is none any more [-].
+        """
+        tight = self._scaled_links(self.stiffness_of(fit), below)
         return [e for e in self.links if self.first_stiffness[e] > 0.0 and e not in tight]
 
-    def _scaled_links(self, stiffness: FloatArray) -> list[int]:
+    def _scaled_links(self, stiffness: FloatArray, above: float = LEAST_STIFFNESS) -> list[int]:
         """Link equations of which the scale follows the stiffness (E,)."""
         first = self.first_stiffness
-        return [e for e in self.links if first[e] > 0.0 and stiffness[e] > LEAST_STIFFNESS * first[e]]
+        return [e for e in self.links if first[e] > 0.0 and stiffness[e] > above * first[e]]
 
     @cached_property
     def first_stiffness(self) -> FloatArray:

@@ -26,6 +26,10 @@ up most of the floor, ..."""
 CONSISTENT = 1.0
 """... until the floor has about what the fit makes of these steps: their share of it is one at most [-]."""
 
+NEARLY_LOST = 0.05
+"""Share of the stiffness of a first fit below which a spring is as good as lost [-]: a step of a fit seldom passes
+`LEAST_STIFFNESS`, and one that loses a spring ends there."""
+
 ANCHORED = 0.3
 """Size, in standard deviations of the noise, of a change that effects are not made to follow any more [-]: an estimate
 is off by that at most, ..."""
@@ -60,17 +64,22 @@ def settle(bench: Bench, effects: Sequence[Effect], rounds: int = 2) -> Settled:
         if bench.share_of_steps(settled.fit, settled.noise) <= CONSISTENT:
             break
         settled = settle_again(bench, settled.fit)
-    slack = bench.slack_links(settled.fit)
-    if slack:
+    lost = _lost_springs(bench, settled.fit)
+    if any(lost):
         # a model that lacks much may lose a spring from here, and keep it from where the description puts it
         described = np.nan_to_num(prior_parameters(bench.robot, settled.fit.effects))
         known = {c.name: float(v) for c, v in zip(fit.columns, described, strict=True)}
         other = Settled(bench.fit(settled.fit.effects, settled.noise, start=known), settled.noise)
         for _ in range(rounds):
             other = settle_again(bench, other.fit)
-        if len(bench.slack_links(other.fit)) < len(slack):
+        if _lost_springs(bench, other.fit) < lost:
             return other
     return settled
+
+
+def _lost_springs(bench: Bench, fit: Fit) -> tuple[int, int]:
+    """How many springs have lost their stiffness in a fit, and how many have nearly lost it."""
+    return len(bench.slack_links(fit)), len(bench.slack_links(fit, NEARLY_LOST))
 
 
 def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Settled:

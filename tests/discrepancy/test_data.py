@@ -74,6 +74,9 @@ def test_a_spring_without_stiffness_is_seen(nothing_missing):
     gone = {**now.fit.parameters, "knee.spring_stiffness": 0.0, "knee.spring_stiffening": 0.0}
     slack = bench.slack_links(bench.predicted(now.fit.effects, gone))
     assert [(bench.data.equations[e].joint, str(bench.data.equations[e].kind)) for e in slack] == [("knee", "link")]
+    softer = {name: 0.1 * value for name, value in now.fit.parameters.items() if name.startswith("knee.spring_")}
+    fit = bench.predicted(now.fit.effects, {**now.fit.parameters, **softer})
+    assert (len(bench.slack_links(fit)), len(bench.slack_links(fit, 0.15))) == (0, 1)
 
 
 @pytest.mark.parametrize(
