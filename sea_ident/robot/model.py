@@ -1,5 +1,6 @@
 """The robot: links and rotors as one Pinocchio model, exact in the plane and in 3-D."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -259,10 +260,9 @@ class Robot:
             given = np.zeros(0)
         if given.shape != (3,) or not np.all(np.isfinite(given)):
             raise RobotError(f"gravity is {gravity!r}; give three numbers [m/s2], as (0, 0, -9.81)")
-        if np.linalg.norm(given) > LARGEST_GRAVITY:
-            raise RobotError(
-                f"gravity is {given.tolist()}, {np.linalg.norm(given):.4g} m/s2; is it in m/s2? Usual is 9.81 at most"
-            )
+        size = math.hypot(*given)  # of any finite numbers
+        if size > LARGEST_GRAVITY:
+            raise RobotError(f"gravity is {given.tolist()}, {size:.4g} m/s2; is it in m/s2? Usual is 9.81 at most")
         model, extended = pin.Model(self.model), pin.Model(self.extended_model)
         model.gravity = pin.Motion(given, np.zeros(3))
         extended.gravity = pin.Motion(given, np.zeros(3))

@@ -79,6 +79,7 @@ def test_gravity_of_the_base_is_a_base_that_is_turned(rpy):
         ((0.0, 0.0, float("nan")), "give three numbers"),
         (("down", 0.0, 0.0), "give three numbers"),
         ((0.0, 0.0, -9810.0), "9810 m/s2; is it in m/s2"),
+        ((0.0, 0.0, -1e308), r"1e\+308 m/s2; is it in m/s2"),
     ],
 )
 def test_what_is_no_gravity_is_refused(gravity, said):
