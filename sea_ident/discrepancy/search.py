@@ -1,4 +1,4 @@
-"""Which effects are missing: forward selection with a family-wise level, exchange, backward elimination."""
+"""Which effects are missing: forward selection with a family-wise level, exchange, and what is needed of that."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,54 +11,23 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import Candidate, scan
 from sea_ident.discrepancy.columns import Key
 from sea_ident.discrepancy.common_delays import with_a_common_delay
-from sea_ident.discrepancy.edges import sharpened, without_another
+from sea_ident.discrepancy.elimination import Elimination, eliminate
 from sea_ident.discrepancy.exchange import Tried, exchange
-from sea_ident.discrepancy.fit import Fit, Solution
+from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.formed import formed
 from sea_ident.discrepancy.friction_and_constant import both_at_once
-from sea_ident.discrepancy.judge import (
-    SMALLEST_SHARE,
-    at_a_bound,
-    is_given,
-    is_push,
-    own_torque,
-    significance,
-    too_short,
-    torque_change,
-    torque_changes,
-)
-from sea_ident.discrepancy.kinks import at_its_kink
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.lags import with_their_lags
-from sea_ident.discrepancy.next_effect import (
-    BESIDE_ANOTHER,
-    FAMILY_LEVEL,
-    LARGE_TORQUE,
-    next_effect,
-    visible_changes,
-)
+from sea_ident.discrepancy.judge import SMALLEST_SHARE, is_given, significance, too_short, torque_changes
+from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, next_effect, visible_changes
 from sea_ident.discrepancy.one_for_two import one_for_two
-from sea_ident.discrepancy.physics import bends_another, physical, possible
+from sea_ident.discrepancy.physics import possible
 from sea_ident.discrepancy.placements import with_placements
-from sea_ident.discrepancy.powers import with_their_powers
 from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again, settled_in_form
-from sea_ident.discrepancy.slips import by_the_first_element, without_what_sticks
-from sea_ident.discrepancy.taken_up import taken_up
+from sea_ident.discrepancy.slips import by_the_first_element
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
 
 MOST_EFFECTS = 6
 """Largest number of effects that are added, beside those that the description gives."""
-
-PUSHES_BACK = 0.2
-"""Share of a large push by which the torque must change without it: else it only cancels another [-]."""
-
-BEYOND_FORM = 2.0
-"""Times the torque that is left without a name by which a push must exceed it: forms that are not those of the library
-leave something at certain times of a period too, and a push fits there [-], ..."""
-
-BEYOND_DOUBT = 0.02
-"""... unless it leaves less than this share of the excess without it: no other form is so alike a push that comes and
-goes, and without it nothing else is told [-]."""
 
 NOT_ASKED = float("nan")
 """Significance of what is in a model before it is asked for one: that is done beside all that is found."""
@@ -189,7 +158,7 @@ def search(
         before = now
         now = _settled(bench, settle_again(bench, new))
         waits = now.fit.statistic > FAR_FROM_RIGHT * now.fit.dof and _possible(bench, now, len(added))
-        now = _formed(bench, now) if waits else _improved(bench, now, len(added), tried, ruled_out)
+        now = formed(bench, now) if waits else _improved(bench, now, len(added), tried, ruled_out)
         if not _possible(bench, now, len(added)):
             del added[-more:]
             now = before
@@ -197,7 +166,7 @@ def search(
     now, left = one_for_two(bench, now, len(added))
     added = [added[k] for k in left]
     whole = Selection(start, now, len(added), tuple(added), tuple(candidates), tests, tried=tried)
-    now, added = _eliminate(bench, now, added, tests)
+    now, added = eliminate(bench, now, added, tests)
     added = _asked(bench, now, added, tests)
     now = settled_in_form(bench, now, len(now.fit.effects) - len(added), by_the_first_element)
     return replace(whole, final=anchored_in_itself(bench, now), added=len(added), p_values=tuple(added), whole=whole)
@@ -230,9 +199,9 @@ def _as_described(bench: Bench, start: Settled) -> tuple[Settled, list[float]]:
         if late is not start and late.fit.statistic / late.fit.dof < now.fit.statistic / now.fit.dof:
             return late, [NOT_ASKED]
     count = len(now.fit.effects) - len(start.fit.effects)
-    now, added = _eliminate(bench, now, [0.0] * count, count, fewest=0)
+    now, added = eliminate(bench, now, [0.0] * count, count, fewest=0)
     positions = range(len(now.fit.effects) - len(added), len(now.fit.effects))
-    without = side_by_side(_Elimination(bench, now, count, 0.0), positions)
+    without = side_by_side(Elimination(bench, now, count, 0.0), positions)
     return now, [each.p_value for each in without]
 
 
@@ -257,18 +226,9 @@ def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: C
     What is tried in the place of a push has sharp edges, and so must the push; what took the place of another effect
     may move them.
     """
-    now = _formed(bench, now)
+    now = formed(bench, now)
     exchanged = exchange(bench, now, added, tried, ruled_out)
-    return now if exchanged is now else _formed(bench, _settled(bench, exchanged))
-
-
-def _formed(bench: Bench, now: Settled) -> Settled:
-    """Pushes with their edges and springs with their kinks where they belong, saturation and delays as they need."""
-    first = len(bench.effects)
-    sharp = sharpened(bench, now.fit, now.noise, first)
-    now = settled_in_form(bench, now if sharp is now.fit else settle_again(bench, sharp), first, at_its_kink)
-    now = settled_in_form(bench, now, first, without_what_sticks)
-    return with_their_lags(bench, with_their_powers(bench, now, first), first)
+    return now if exchanged is now else formed(bench, _settled(bench, exchanged))
 
 
 def _settled(bench: Bench, now: Settled) -> Settled:
@@ -294,97 +254,8 @@ def _largest_changes(bench: Bench, fit: Fit, added: int) -> FloatArray:
 def still_needed(bench: Bench, selection: Selection) -> Selection:
     """What is left of what was found before more was known of the recording."""
     now = settle_again(bench, selection.final.fit)
-    now, p_values = _eliminate(bench, now, list(selection.p_values), selection.tests, fewest=0)
+    now, p_values = eliminate(bench, now, list(selection.p_values), selection.tests, fewest=0)
     return replace(selection, final=now, added=len(p_values), p_values=tuple(p_values))
-
-
-def _eliminate(
-    bench: Bench, now: Settled, added: list[float], tests: int, fewest: int = 1
-) -> tuple[Settled, list[float]]:
-    """Take out effects that are not needed or not physical, one after the other; of the physical the fewest stay."""
-    added = list(added)
-    while len(added) > fewest or (added and not physical(bench, now.fit, -1)):
-        fit, noise = now.fit, now.noise
-        nameless = remainder_share(bench, now) if lack_of_fit(bench, now)[2] < LACK_LEVEL else 0.0
-        first = len(fit.effects) - len(added)
-        positions = range(first, len(fit.effects))
-        scores = list(side_by_side(_Elimination(bench, now, tests, nameless), positions))
-        worst = max(zip(scores, positions, strict=True), key=lambda each: each[0].rank)
-        if worst[0].p_value <= FAMILY_LEVEL:
-            break
-        now = settle_again(bench, bench.again(worst[0].left, noise))
-        # its edges were those of a push that stood where it does not, or that another stood in for
-        now = _formed(bench, now) if is_push(fit.effects[worst[1]]) else now
-        del added[worst[1] - first]
-    return now, added
-
-
-@dataclass(frozen=True, eq=False)
-class _Without:
-    """What is left without an effect.
-
-    Attributes:
-        p_value: of the effect, 1 where it is not needed.
-        statistic: without it.
-        left: the model without it.
-        sound: whether the others are physical there. Where two bend one another, the one that fits a little better
-            alone may do so as what cannot be.
-    """
-
-    p_value: float
-    statistic: float
-    left: Solution
-    sound: bool
-
-    @property
-    def rank(self) -> tuple[bool, bool, float, float]:
-        """The larger, the rather the effect is taken out."""
-        return self.p_value > FAMILY_LEVEL, self.sound, self.p_value, -self.statistic
-
-
-@dataclass(frozen=True, eq=False)
-class _Elimination:
-    """Takes effects out of a model.
-
-    Attributes:
-        bench: the recording.
-        now: the model.
-        tests: number of shapes of all candidates.
-        nameless: torque that is left without a name, as a share of it [-].
-    """
-
-    bench: Bench
-    now: Settled
-    tests: int
-    nameless: float
-
-    def __call__(self, position: int) -> _Without:
-        """The model without the effect at a position."""
-        bench, fit, noise, first = self.bench, self.now.fit, self.now.noise, len(self.bench.effects)
-        effect, others = fit.effects[position], [e for k, e in enumerate(fit.effects) if k != position]
-        without = bench.refine(others, noise, start=fit.parameters, only=first)
-        if is_push(effect):
-            without = without_another(bench, without, noise, effect, first)
-        elif any(is_push(other) for other in others[first:]):
-            # what bent the edges of a push is not needed for them
-            without = sharpened(bench, without, noise, first)
-        loss = without.statistic - fit.statistic
-        columns = max(len(effect.columns(bench.robot)), 1)
-        visible, own = torque_change(bench, fit, without), own_torque(bench, fit, position)
-        # as where it was added: what the model bends by without it says nothing of its size
-        shows = visible >= SMALLEST_SHARE or taken_up(bench, without, fit, noise, position)
-        needed = shows and 2.0 * own >= SMALLEST_SHARE and physical(bench, fit, position)
-        # nor what beside the others ended at the end of its range, or is over sooner by now than can be shown
-        needed = needed and not at_a_bound(effect) and not too_short(bench, effect)
-        if is_push(effect):
-            needed = needed and (own > BEYOND_FORM * self.nameless or fit.excess < BEYOND_DOUBT * without.excess)
-            # a push comes and goes: nothing but another push can cancel it
-            needed = needed and (own < LARGE_TORQUE or visible > PUSHES_BACK * own)
-        needed = needed and not bends_another(bench, fit, position)
-        p_value = significance(loss, columns, self.tests, without, noise) if needed else 1.0
-        added = range(first, len(others))
-        sound = p_value <= FAMILY_LEVEL or all(physical(bench, without, k) for k in added)
-        return _Without(p_value, without.statistic, without.solution, sound)
 
 
 def without(bench: Bench, selection: Selection, weak: Sequence[int]) -> Selection:

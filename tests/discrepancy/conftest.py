@@ -10,6 +10,7 @@ import pytest
 import sea_ident
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import Settled, settle
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.motion import FourierSeries
@@ -108,3 +109,14 @@ def rippled(laboratory):
     with_it = bench.fit((*start.fit.effects, ripple), start.noise, start=start.fit.parameters)
     again = Settled(with_it, bench.noise(with_it))
     return bench, start, Settled(bench.fit(with_it.effects, again.noise, start=with_it.parameters), again.noise)
+
+
+@pytest.fixture(scope="session")
+def unequal(laboratory):
+    """A large offset at the knee, and at the hip a Stribeck effect that is small beside it."""
+    planted = [
+        ("torque_offset", "knee", [-2.0], {}),
+        ("stribeck_friction", "hip", [2.0], {"speed": 0.1, "exponent": 2.0}),
+    ]
+    bench = laboratory.bench(laboratory.record(planted, periods=8))
+    return bench, search(bench, bench.effects)

@@ -219,7 +219,7 @@ def test_a_search_tells_what_it_had_before_it_took_anything_out(rippled, monkeyp
         taken.append(now)
         return start, []
 
-    monkeypatch.setattr("sea_ident.discrepancy.search._eliminate", none_left)
+    monkeypatch.setattr("sea_ident.discrepancy.search.eliminate", none_left)
     found = search(bench, bench.effects, begun, start=start)
     assert found.added == 0
     assert found.final is start

@@ -21,11 +21,12 @@ from sea_ident.discrepancy.edges import (
     with_sharp_edges,
     without_another,
 )
+from sea_ident.discrepancy.elimination import eliminate
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.linear import whiten
 from sea_ident.discrepancy.named import named_effects
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import Selection, _eliminate, search
+from sea_ident.discrepancy.search import Selection, search
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.uncertainty import uncertainties
 from sea_ident.effects import State, make_effect
@@ -142,7 +143,7 @@ def test_two_pushes_at_once_make_room_for_one_off_the_centre_of_mass(laboratory)
     now = settle(bench, bench.effects)
     two = [make_effect("external_force", joint, **times) for joint in ("knee", "hip")]
     begun = bench.fit((*now.fit.effects, *two), now.noise, start=now.fit.parameters)
-    now, p_values = _eliminate(bench, settle_again(bench, begun), [1e-9, 1e-9], 1000)
+    now, p_values = eliminate(bench, settle_again(bench, begun), [1e-9, 1e-9], 1000)
     assert len(p_values) == 1
     own, stds = now.fit.effects[-1], uncertainties(bench, now)
     assert (own.name, own.joint) == ("external_force", "knee")
@@ -161,7 +162,7 @@ def test_what_was_found_beside_the_wrong_edges_of_a_push_is_not_needed_for_them(
     bench = laboratory.bench(laboratory.record([(push, [20.0, 0.0, -60.0])], periods=10))
     wrong = replace(push, start=1.3 + late * PERIOD / bench.data.samples)
     now = settle(bench, (*bench.effects, wrong, make_effect("link_flexibility", "knee", compliance=1e-4)))
-    left, p_values = _eliminate(bench, now, [1e-9, 1e-9], 100)
+    left, p_values = eliminate(bench, now, [1e-9, 1e-9], 100)
     assert [effect.name for effect in left.fit.effects[len(bench.effects) :]] == ["external_force"]
     assert len(p_values) == 1
     assert left.fit.statistic < 1.2 * left.fit.dof < 0.2 * now.fit.statistic

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.formed import formed
 from sea_ident.discrepancy.free_shapes import free_shapes
 from sea_ident.discrepancy.judge import penalty
 from sea_ident.discrepancy.kinks import at_its_kink
 from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import _formed, search
+from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import Settled, settle, settled_in_form
 from sea_ident.effects import make_effect
 
@@ -92,4 +93,4 @@ def test_a_candidate_is_compared_with_its_kink_where_it_belongs(kinked):
 def test_what_was_found_beside_something_else_moves_its_kink(kinked):
     bench, start = kinked
     now = Settled(beginning(bench, start, kink=0.7 * KINK), start.noise)
-    assert _formed(bench, now).fit.effects[-1].kink == pytest.approx(KINK, rel=0.02)
+    assert formed(bench, now).fit.effects[-1].kink == pytest.approx(KINK, rel=0.02)

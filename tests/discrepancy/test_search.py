@@ -10,10 +10,11 @@ from sea_ident import side_by_side
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.exchange import Outdone
+from sea_ident.discrepancy.formed import formed
 from sea_ident.discrepancy.judge import EQUALLY_GOOD, own_torque, penalty, slowest
 from sea_ident.discrepancy.lack import lack_of_fit
 from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, LARGE_TORQUE, visible_changes
-from sea_ident.discrepancy.search import Selection, _eliminate, _Elimination, _lost, search, still_needed
+from sea_ident.discrepancy.search import Selection, _lost, search, still_needed
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import make_effect
 from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFriction
@@ -21,17 +22,6 @@ from sea_ident.effects.nonlinear_viscous_friction import NonlinearViscousFrictio
 
 def named(selection):
     return {(effect.name, effect.joint) for effect in selection.effects}
-
-
-@pytest.fixture(scope="module")
-def unequal(laboratory):
-    """A large offset at the knee, and at the hip a Stribeck effect that is small beside it."""
-    planted = [
-        ("torque_offset", "knee", [-2.0], {}),
-        ("stribeck_friction", "hip", [2.0], {"speed": 0.1, "exponent": 2.0}),
-    ]
-    bench = laboratory.bench(laboratory.record(planted, periods=8))
-    return bench, search(bench, bench.effects)
 
 
 @pytest.mark.scenario
@@ -117,9 +107,9 @@ def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
 def test_a_push_has_its_edges_right_before_another_takes_its_place(unequal, monkeypatch):
     bench, _ = unequal
     calls = []
-    for name in ("sharpened", "exchange"):
-        plain = search.__globals__[name]
-        monkeypatch.setitem(search.__globals__, name, lambda *a, n=name, f=plain: (calls.append(n), f(*a))[1])
+    for function, name in ((formed, "sharpened"), (search, "exchange")):
+        there = function.__globals__
+        monkeypatch.setitem(there, name, lambda *a, n=name, f=there[name]: (calls.append(n), f(*a))[1])
     added = search(bench, bench.effects).added
     assert calls == ["sharpened", "exchange"] * added
 
@@ -225,97 +215,6 @@ def test_two_orders_at_one_joint_are_found_within_their_uncertainties(laboratory
     assert lack_of_fit(bench, found.final)[2] > 1e-3
 
 
-@pytest.mark.scenario
-def test_a_push_that_is_hardly_larger_than_what_has_no_name_is_a_part_of_that(laboratory):
-    """At certain times of a period a form that is not the right one leaves something too, and a push fits there."""
-    push = make_effect("external_force", "ankle", start=0.4, stop=0.9)
-    ripple = make_effect("torque_ripple", "hip", order=4.0)
-    planted = [("external_force", "ankle", [0.0, 0.0, 0.4], {"start": 0.4, "stop": 0.9})]
-
-    def kept(amplitude, known):
-        ripples = ("torque_ripple", "hip", [amplitude, 0.0], {"order": 4.0})
-        recording = laboratory.record([*planted, ripples], periods=5)
-        bench = laboratory.bench(recording)
-        start = settle(bench, (*bench.effects, *known))
-        now = settle(bench, (*bench.effects, *known, push))
-        return still_needed(bench, Selection(start, now, 1, (1e-9,))).added
-
-    assert kept(2.0, []) == 0
-    assert kept(2.0, [ripple]) == 1
-    assert kept(0.01, []) == 1
-
-
-@pytest.mark.scenario
-@pytest.mark.parametrize(("amplitude", "stays"), [(0.0, True), (0.3, False)])
-def test_a_push_that_leaves_nearly_nothing_is_none_of_another_form(laboratory, amplitude, stays):
-    """However small it is beside what has no name at another joint: nothing else would be told without it."""
-    planted = [
-        ("external_force", "ankle", [0.0, 0.0, 2.0], {"start": 0.4, "stop": 0.9}),
-        ("torque_ripple", "hip", [amplitude, 0.0], {"order": 4.0}),
-    ]
-    bench = laboratory.bench(laboratory.record(planted, periods=5))
-    now = settle(bench, (*bench.effects, make_effect("external_force", "ankle", start=0.4, stop=0.9)))
-    position = len(bench.effects)
-    for nameless in (0.0, own_torque(bench, now.fit, position)):
-        tried = _Elimination(bench, now, 100, nameless)(position)
-        assert (tried.p_value < 1e-100) is (stays or not nameless)
-
-
-@pytest.mark.parametrize("first", [0, 1])
-def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, first):
-    """Whichever was found first; alone the other one is needed."""
-    bench, found = unequal
-    both = len(found.final.fit.effects)
-    bends = "sea_ident.discrepancy.search.bends_another"
-    monkeypatch.setattr(bends, lambda _, fit, __: len(fit.effects) == both)
-    effects = (*bench.effects, *(found.effects if first == 0 else found.effects[::-1]))
-    fit = bench.fit(effects, found.final.noise, start=found.final.fit.parameters)
-    begun = replace(found, final=Settled(fit, found.final.noise))
-    assert named(still_needed(bench, begun)) == {("torque_offset", "knee")}
-
-
-def test_of_two_that_only_bend_each_other_the_one_goes_without_which_the_other_can_be(unequal, monkeypatch):
-    """Though what cannot be fits better: alone it would go as well, and nothing be left."""
-    bench, found = unequal
-    both = len(found.final.fit.effects)
-    monkeypatch.setattr("sea_ident.discrepancy.search.bends_another", lambda _, fit, __: len(fit.effects) == both)
-
-    def physical(_, fit, position):
-        return len(fit.effects) == both or fit.effects[position].name != "torque_offset"
-
-    monkeypatch.setattr("sea_ident.discrepancy.search.physical", physical)
-    assert named(still_needed(bench, found)) == {("stribeck_friction", "hip")}
-
-
-@pytest.mark.parametrize(("own", "left"), [(4e-4, 1), (6e-4, 2)])
-def test_what_is_smaller_than_what_matters_goes_however_the_model_bends_without_it(unequal, monkeypatch, own, left):
-    bench, found = unequal
-    shares = {"stribeck_friction": own, "torque_offset": 1.0}
-    monkeypatch.setattr(
-        "sea_ident.discrepancy.search.own_torque", lambda _, fit, position: shares[fit.effects[position].name]
-    )
-    assert still_needed(bench, found).added == left
-
-
-@pytest.mark.parametrize(("hidden", "left"), [(False, 0), (True, 2)])
-def test_what_hardly_shows_stays_where_another_takes_it_up(unequal, monkeypatch, hidden, left):
-    bench, found = unequal
-    monkeypatch.setattr("sea_ident.discrepancy.search.torque_change", lambda *args: 0.0)
-    monkeypatch.setattr("sea_ident.discrepancy.search.taken_up", lambda *args: hidden)
-    assert still_needed(bench, found).added == left
-
-
-def test_what_ended_at_the_end_of_its_range_beside_the_others_goes(unequal):
-    """It was at none when it was added: the others were missing yet."""
-    bench, found = unequal
-    lowest = next(s.lower for s in found.effects[0].shapes + found.effects[1].shapes if s.name == "speed")
-    ended = [replace(e, speed=lowest) if e.name == "stribeck_friction" else e for e in found.effects]
-    fit = bench.fit((*bench.effects, *ended), found.final.noise, start=found.final.fit.parameters)
-    left, p_values = _eliminate(bench, Settled(fit, found.final.noise), list(found.p_values), found.tests)
-    assert [e.name for e in left.fit.effects[len(bench.effects) :]] == ["torque_offset"]
-    assert len(p_values) == 1
-
-
 @dataclass(frozen=True)
 class Thinning(NonlinearViscousFriction):
     """Friction of a grease that thins with the speed of shear: c theta' / (1 + |theta'| / speed)."""
@@ -360,23 +259,6 @@ def test_two_effects_of_a_link_are_found_by_their_laws(laboratory, coulomb, moti
     for name, value in (("parallel_spring_stiffness", 0.4), ("link_friction_coulomb", coulomb)):
         k = next(k for k, c in enumerate(found.final.fit.columns) if c.name == f"knee.{name}")
         assert found.final.fit.values[k] == pytest.approx(value, abs=4.0 * found.final.fit.std(k))
-
-
-def test_what_is_not_physical_in_the_end_is_not_found(rippled):
-    """Its part of the wrong sign was excused as long as others might be missing."""
-    bench, _, right = rippled
-    fit = right.fit
-    friction = make_effect("link_friction", "hip")
-    values = dict(fit.parameters)
-    with_it = bench.fit((*fit.effects, friction), right.noise, start=values)
-    columns = [c.name for c in with_it.columns]
-    bent = with_it.values.copy()
-    bent[[columns.index(f"hip.link_friction_{part}") for part in ("viscous", "coulomb")]] = -5.0, 5.0
-    now = Settled(replace(with_it, values=bent), right.noise)
-    left, p_values = _eliminate(bench, now, [1e-9, 1e-9], 1000)
-    assert [e.name for e in left.fit.effects[-1:]] == ["torque_ripple"]
-    assert len(p_values) == 1
-    assert _eliminate(bench, Settled(replace(with_it, values=bent), right.noise), [1e-9], 1000)[1] == []
 
 
 @pytest.mark.scenario
@@ -444,11 +326,3 @@ def test_what_became_too_short_while_the_model_settled_is_not_kept(laboratory, m
     bench = laboratory.bench(laboratory.record(planted, periods=8))
     monkeypatch.setitem(search.__globals__, "too_short", lambda bench, effect: short)
     assert named(search(bench, bench.effects)) == (set() if short else {("presliding_friction", "knee")})
-
-
-def test_what_became_too_short_is_not_needed(unequal, monkeypatch):
-    bench, selection = unequal
-    position, now = len(bench.effects), selection.final
-    for short in (False, True):
-        monkeypatch.setitem(_Elimination.__call__.__globals__, "too_short", lambda bench, effect, s=short: s)
-        assert (_Elimination(bench, now, selection.tests, 0.0)(position).p_value == 1.0) == short
