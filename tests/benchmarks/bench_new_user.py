@@ -230,24 +230,29 @@ def sines(rng: np.random.Generator, amplitude: float) -> tuple[Array, Array]:
 
 def simulated(case: Case, rng: np.random.Generator, periods: int, amplitude: float) -> Array:
     """(N, 9) positions of links and motors and currents, two periods to settle left out."""
-    arm = build(case)
     position, velocity = sines(rng, amplitude)
+    return stepped(case, position, velocity, 2 * len(position), periods * len(position))
+
+
+def stepped(case: Case, position: Array, velocity: Array, settling: int, kept: int) -> Array:
+    """The same of any motion (K, 3), over and over, in so many steps, the first of which are left out."""
+    arm = build(case)
     count, data = len(position), arm.model.createData()
     x, v, tau = np.zeros(arm.model.nq), np.zeros(arm.model.nv), np.zeros(arm.model.nv)
     x[arm.links], x[arm.motors] = position[0], RATIO * position[0]
     every, rows = round(1.0 / RATE / STEP), []
-    for k in range((periods + 2) * count):
+    for k in range(settling + kept):
         q, theta, dq, dtheta = x[arm.links], x[arm.motors] / RATIO, v[arm.links], v[arm.motors] / RATIO
         bent = theta - q
         command = GAINS[0] * (position[k % count] - theta) + GAINS[1] * (velocity[k % count] - dtheta)
         spring = STIFFNESS * bent + CUBIC * bent**3 + DAMPING * (dtheta - dq)
         friction = VISCOUS * dtheta + COULOMB * dtheta / np.sqrt(dtheta**2 + SMOOTHING**2)
-        at_motor, in_spring, on_link = case.hidden(Moment(k * STEP - 2.0 * PERIOD, q, theta, dq, dtheta, spring))
+        at_motor, in_spring, on_link = case.hidden(Moment((k - settling) * STEP, q, theta, dq, dtheta, spring))
         spring = spring + in_spring
         tau[arm.links], tau[arm.motors] = spring + on_link, (command - spring - friction - at_motor) / RATIO
         v = v + STEP * pin.aba(arm.model, data, x, v, tau)
         x = x + STEP * v
-        if k >= 2 * count and k % every == 0:
+        if k >= settling and k % every == 0:
             rows.append(np.concatenate([q, theta, command / (RATIO * TORQUE_CONSTANT)]))
     return np.array(rows)
 

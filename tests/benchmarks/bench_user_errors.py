@@ -101,6 +101,7 @@ def cases() -> Iterator[Case]:
         yield Case("prosthesis", "encoder_offset", joint, shape={"offset": offset}, robot="prosthesis")
     yield Case("prosthesis", "link_friction", "ankle", (0.3, 1.0), robot="prosthesis")
     yield Case("prosthesis", "position_delay", "knee", shape={"delay": 0.01}, robot="prosthesis")
+    yield Case("prosthesis", "torque_offset", "knee", (3.0,), robot="prosthesis")
     push = {"start": 1.0, "stop": 1.7, "period": PERIOD}
     yield Case("prosthesis", "external_force", "ankle", (8.0, 3.0, -5.0), push, robot="prosthesis")
     yield Case("prosthesis", "stribeck_friction", "knee", (1.0,), {"speed": 0.08}, robot="prosthesis")
