@@ -277,7 +277,15 @@ class Bench(ParameterFits):
     @cached_property
     def torque_rms(self) -> FloatArray:
         """(E,) rms of the motor torque of the joint that each equation belongs to [N m]."""
-        rms = np.sqrt(np.mean(self.data.tau_motor**2, axis=0))
+        return self._rms_of_joints(self.data.tau_motor)
+
+    @cached_property
+    def described_rms(self) -> FloatArray:
+        """(E,) rms of what the bodies need there as they are described [N m]: a constant may cancel their weight."""
+        return self._rms_of_joints(self.state(self.effects).body_torque(self.robot.inertial_parameters))
+
+    def _rms_of_joints(self, torque: FloatArray) -> FloatArray:
+        rms = np.sqrt(np.mean(torque**2, axis=0))
         return np.asarray(rms[[equation.index for equation in self.data.equations]], dtype=np.float64)
 
 

@@ -31,7 +31,7 @@ ABOUT = 2.0
 """Times as stiff as it is described, or as soft, that a spring may be to be that one [-]."""
 
 LARGEST_TIMES_TORQUE = 1.5
-"""No effect is larger than this many times the torque of the motor (rms)."""
+"""No effect is larger than this many times the torque of the motor, or what the described bodies need (rms)."""
 
 SLIPPING = 0.1
 """Share of the torque of dry friction in a spring that must be in elements that slip to and fro [-]."""
@@ -221,7 +221,7 @@ def _but_for_signs(bench: Bench, fit: Fit, position: int) -> bool:
     if is_term(effect):
         return True  # terms of one law cancel in part, and what they come to is asked above
     total = np.sqrt(np.sum(np.abs(bench.column_spectra(effect, fit.effects) @ values) ** 2, axis=0))
-    return not np.any(total > LARGEST_TIMES_TORQUE * bench.torque_rms)
+    return not np.any(total > LARGEST_TIMES_TORQUE * np.maximum(bench.torque_rms, bench.described_rms))
 
 
 def _as_stiff_as_described(bench: Bench, fit: Fit, effect: EncoderOffset) -> bool:

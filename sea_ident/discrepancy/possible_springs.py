@@ -4,7 +4,8 @@ Where the deflection stays on one side of zero and varies little, a negative sti
 anything smooth: what the model lacks there, as another zero of an encoder, then seems to be nothing.
 
 They are searched with another zero of each motor encoder, and so are springs whose misfit goes with that. Without, a
-zero that is far off leaves so little of such a spring that nothing in it promises anything.
+zero that is far off leaves so little of such a spring that nothing in it promises anything. A constant torque at the
+motor that is large beside its load does the same, and stands in the place of the zero where it explains more.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -13,6 +14,7 @@ import numpy as np
 
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.search import NOT_ASKED, Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.effects import Effect
@@ -20,6 +22,7 @@ from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.offset import Offset
 from sea_ident.effects.spring_offset import SpringOffset
 from sea_ident.effects.spring_stiffening import SpringStiffening
+from sea_ident.effects.torque_offset import TorqueOffset
 from sea_ident.robot import Robot
 
 CERTAIN = 5.0
@@ -57,7 +60,7 @@ def with_fitted_zeros(bench: Bench, joints: Collection[str]) -> Selection:
 
 
 def begun_with_zeros(bench: Bench, zeros: Sequence[Offset], start: Settled | None = None) -> Selection:
-    """A model with wrong zeros, as if these had been found: from where a search goes on.
+    """A model with wrong zeros, or constant torques that explain more, as if found: from where a search goes on.
 
     Args:
         bench: the recording.
@@ -65,9 +68,23 @@ def begun_with_zeros(bench: Bench, zeros: Sequence[Offset], start: Settled | Non
         start: the model without, settled, where that was done already.
     """
     start = settle(bench, bench.effects) if start is None else start
-    fit = bench.fit((*start.fit.effects, *zeros), None, tangents=False)
-    final = settle_again(bench, settle_again(bench, fit).fit)
+    first = len(start.fit.effects)
+    final = _begun(bench, (*start.fit.effects, *zeros))
+    for k, zero in enumerate(zeros):
+        if isinstance(zero, MotorEncoderOffset):
+            effects = final.fit.effects
+            constant = TorqueOffset(str(zero.joint))
+            other = _begun(bench, (*effects[: first + k], constant, *effects[first + k + 1 :]))
+            there = settle_again(bench, other.fit, final.noise).fit
+            if there.statistic < final.fit.statistic - EQUALLY_GOOD * final.fit.unit:
+                final = other
     return Selection(start, final, len(zeros), (NOT_ASKED,) * len(zeros))
+
+
+def _begun(bench: Bench, effects: Sequence[Effect]) -> Settled:
+    """A model fitted from nothing, its springs with it."""
+    fit = bench.fit(effects, None, tangents=False)
+    return settle_again(bench, settle_again(bench, fit).fit)
 
 
 def left_without_cubic(robot: Robot, stiffness: Mapping[str, float]) -> tuple[str, ...]:

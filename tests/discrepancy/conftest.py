@@ -1,7 +1,7 @@
 """A leg, a short motion of it and what its sensors see: shared by the tests of the parts of a diagnosis."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from sea_ident.robot import Robot
 from sea_ident.simulation import FrictionJitter, PlantedEffect, Settling, simulate
 
 PERIOD = 5.0
+PROSTHESIS = Path(__file__).parents[1] / "benchmarks" / "hidden_effects" / "robots" / "prosthesis.urdf"
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,18 @@ def series():
 @pytest.fixture(scope="session")
 def laboratory(leg, series):
     return Laboratory(leg, tuple(series))
+
+
+@pytest.fixture(scope="session")
+def prosthesis(laboratory):
+    """A robot whose ankle carries a light foot, and whose springs hardly deflect, with two motions of its own."""
+    robot = sea_ident.load_robot(PROSTHESIS)
+    middle, swing = 0.5 * (robot.limits.lower + robot.limits.upper), 0.5 * (robot.limits.upper - robot.limits.lower)
+    motions = []
+    for seed in (1, 2):
+        a, b = np.random.default_rng(seed).normal(0.0, 0.22, (2, robot.n, 5)) / np.arange(1, 6) ** 0.8
+        motions.append(FourierSeries(1.0 / PERIOD, middle, a * swing[:, None], b * swing[:, None]))
+    return replace(laboratory, leg=robot, motions=tuple(motions))
 
 
 @pytest.fixture(scope="session")

@@ -254,3 +254,16 @@ def test_a_small_part_of_the_wrong_sign_is_excused_while_others_are_missing(labo
         assert not physical(bench, bent, -1)
         assert possible(bench, bent, start.noise, -1) is accepted
     assert possible(bench, fit, start.noise, -1)
+
+
+@pytest.mark.parametrize(("times", "accepted"), [(0.9, True), (1.1, False)])
+def test_no_effect_is_much_larger_than_what_is_there_and_what_the_bodies_weigh(prosthesis, times, accepted):
+    """A constant torque that bears the leg leaves its motor hardly any."""
+    bench = prosthesis.bench(prosthesis.record([("torque_offset", "knee", [3.0], {})], periods=10))
+    knee = next(k for k, equation in enumerate(bench.data.equations) if equation.joint == "knee")
+    weight = bench.described_rms[knee]
+    assert weight > 4.0 * bench.torque_rms[knee]
+    effects = (*bench.effects, make_effect("torque_offset", "knee"))
+    first = bench.first_fit
+    offset = {"knee.torque_offset": times * LARGEST_TIMES_TORQUE * weight}
+    assert physical(bench, bench.predicted(effects, {**first.parameters, **offset}), -1) == accepted

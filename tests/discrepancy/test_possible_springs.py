@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import diagnose
-from sea_ident.discrepancy.possible_springs import impossible_springs, left_without_cubic, without_cubic
+from sea_ident.discrepancy.possible_springs import (
+    begun_with_zeros,
+    impossible_springs,
+    left_without_cubic,
+    without_cubic,
+)
 from sea_ident.discrepancy.settle import settle
+from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset
 from sea_ident.effects.spring_stiffening import SpringStiffening
 from sea_ident.estimation import identify
 from sea_ident.exceptions import SeaIdentWarning
@@ -103,3 +109,34 @@ def test_zeros_that_the_model_was_not_identified_with_are_found(laboratory, leg)
     assert {m.joint: m.effect for m in found.missing} == dict.fromkeys(zeros, "motor_encoder_offset")
     for missing in found.missing:
         assert missing.parameters[0].value == pytest.approx(zeros[missing.joint], abs=1e-3)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("offset", [3.0, -3.0])
+def test_a_constant_torque_that_cancels_the_load_is_not_taken_for_a_wrong_zero(prosthesis, offset):
+    """Both springs were lost in it, and an eccentric encoder was named with confidence."""
+    planted = [("torque_offset", "knee", [offset], {})]
+    recording = prosthesis.record(planted, periods=10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeaIdentWarning)
+        found = diagnose(identify(prosthesis.leg, recording, period=5.0), recording)
+    (missing,) = found.missing
+    declared = {(missing.effect, missing.joint), *((a.effect, a.joint) for a in missing.alternatives)}
+    assert ("torque_offset", "knee") in declared
+    for one, other in zip(found.model.springs, prosthesis.leg.elastic_indices, strict=True):
+        described = prosthesis.leg.joints[int(other)].actuator.stiffness
+        assert one.stiffness == pytest.approx(described, abs=4.0 * one.stiffness_std)
+    if missing.effect == "torque_offset":
+        (size,) = missing.parameters
+        assert size.value == pytest.approx(offset, abs=3.0 * size.std)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("planted", "kind"), [("torque_offset", "torque_offset"), ("motor_encoder_offset", "zero")])
+def test_a_search_begins_with_a_zero_or_with_a_constant_that_explains_more(prosthesis, planted, kind):
+    amounts = ([3.0], {}) if kind == "torque_offset" else ([], {"offset": 0.05})
+    bench = prosthesis.bench(prosthesis.record([(planted, "knee", *amounts)], periods=10))
+    begun = begun_with_zeros(bench, [MotorEncoderOffset("knee", offset=-0.015 if kind == "torque_offset" else 0.04)])
+    (effect,) = begun.effects
+    assert (effect.name, effect.joint) == (planted, "knee")
+    assert begun.final.fit.statistic < 1.5 * begun.final.fit.dof

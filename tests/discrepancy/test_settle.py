@@ -1,19 +1,13 @@
 """Models in the noise floor, and around the loads, that belong to them."""
 
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 
-from sea_ident import load_robot
 from sea_ident.discrepancy.search import search
 from sea_ident.discrepancy.settle import FAR, Settled, anchored_in_itself, settle, settle_again
 from sea_ident.effects import make_effect
-from sea_ident.motion import FourierSeries
 
-PROSTHESIS = Path(__file__).parents[1] / "benchmarks" / "hidden_effects" / "robots" / "prosthesis.urdf"
-PERIOD = 5.0
 SATURATION = 1e-3
 
 
@@ -99,14 +93,10 @@ def test_a_model_that_lacks_more_is_left_alone(saturated):
 
 
 @pytest.mark.scenario
-def test_a_spring_that_carries_little_is_not_lost_to_what_is_missing_beside_it(laboratory):
+def test_a_spring_that_carries_little_is_not_lost_to_what_is_missing_beside_it(prosthesis):
     """The ankle of a prosthesis, whose foot is light, and friction of the foot that the model lacks."""
-    robot = load_robot(PROSTHESIS)
-    a, b = np.random.default_rng(1).normal(0.0, 0.22, (2, robot.n, 5)) / np.arange(1, 6) ** 0.8
-    swing = 0.5 * (robot.limits.upper - robot.limits.lower)[:, None]
-    series = FourierSeries(1.0 / PERIOD, 0.5 * (robot.limits.lower + robot.limits.upper), a * swing, b * swing)
-    other = replace(laboratory, leg=robot, motions=(series,))
-    bench = other.bench(other.record([("link_friction", "ankle", [0.3, 1.0], {})], periods=10))
+    recording = prosthesis.record([("link_friction", "ankle", [0.3, 1.0], {})], periods=10)
+    bench = prosthesis.bench(recording)
     now = settle(bench, bench.effects)
     assert now.fit.statistic > 50.0 * now.fit.dof
     assert now.fit.parameters["ankle.spring_stiffness"] > 0.5 * 90.0
