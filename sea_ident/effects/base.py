@@ -162,6 +162,13 @@ class Effect(ABC):
         """
         return robot
 
+    def demand(self, robot: Robot, values: FloatArray) -> FloatArray:
+        """(n,) torque that each motor is asked for over what its load and its rotor need [-]; by default one.
+
+        Friction of a motor, and what else acts at it, comes beside that.
+        """
+        return np.ones(robot.n)
+
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """What the sensors show where the effect sits in a sensor; by default all signals as they are.
 

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
+from sea_ident.effects.acting import Action
 from sea_ident.effects.base import Column
 from sea_ident.effects.load import MotorLoadEffect
 from sea_ident.effects.state import Contribution, Side, State
@@ -38,19 +39,20 @@ class TorqueConstant(MotorLoadEffect):
         """Motor row (N, n, 1)."""
         return state.at(Side.MOTOR, self.at, self.column_of(self.load(state) + self.rotor_torque(state), np.zeros(0)))
 
-    def modified(self, robot: Robot, values: FloatArray) -> Robot:
-        """The robot whose rotor takes as much more of the torque as is recorded; the load follows in `torque`.
+    def torque(self, robot: Robot, values: FloatArray) -> Action:
+        """None: it acts in `demand`."""
+        return lambda state, link, motor: None
+
+    def demand(self, robot: Robot, values: FloatArray) -> FloatArray:
+        """As much more at its motor as is recorded.
 
         Raises:
             EffectError: if the motor would turn the other way.
         """
-        factor = 1.0 + float(values[0])
-        if not factor > 0.0:
+        factors = np.ones(robot.n)
+        factors[robot.index(self.at)] += float(values[0])
+        if not np.all(factors > 0.0):
             raise EffectError(
                 f"torque_constant of {values[0]:g} at {self.at!r} turns the motor round; give more than -1"
             )
-        own = [rotor.joint == self.at for rotor in robot.rotors]
-        if not any(own):
-            return robot
-        inertias = np.where(own, factor, 1.0) * robot.rotor_inertias()
-        return robot.with_inertial_parameters(robot.inertial_parameters, inertias)
+        return factors

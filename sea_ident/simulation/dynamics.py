@@ -63,6 +63,15 @@ class ClosedLoop:
 
     Everything inside a step is done with scalars and preallocated arrays: at a dozen coordinates the overhead of a
     call outweighs the arithmetic.
+
+    Args:
+        plant: all numbers.
+        drive: what the motors are asked for.
+        motor_friction: of each joint.
+        link_friction: of each elastic joint.
+        planted: what else acts as a torque.
+        method: of integration.
+        demand: (n,) torque that a motor is asked for over what its load and its rotor need [-].
     """
 
     def __init__(
@@ -73,6 +82,7 @@ class ClosedLoop:
         link_friction: Sequence[JointFriction | None],
         planted: PlantedTorques | None,
         method: RosenbrockW,
+        demand: FloatArray,
     ) -> None:
         robot = plant.robot
         self.plant, self.planted, self._method = plant, planted, method
@@ -104,6 +114,9 @@ class ClosedLoop:
         k1, k3, d = plant.stiffness.tolist(), plant.cubic_stiffness.tolist(), plant.spring_damping.tolist()
         self._numbers = list(zip(range(n), self.motor, kp, kd, k1, k3, d, strict=True))
         self.replace_motor_friction(motor_friction)
+        self._demand = [(i, m, f) for i, m, f in zip(range(n), self.motor, demand.tolist(), strict=True) if f != 1.0]
+        self._reaching = np.ones(size)
+        self._reaching[self.motor] = 1.0 / demand
         self._linear = self._linear_part(kp, kd, k1, d)
         self.increments = np.zeros((len(method.weights), 2 * size))
         self._rows = [(row[:size], row[size:]) for row in self.increments]
@@ -122,8 +135,8 @@ class ClosedLoop:
         stiffness, damping = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
         between = np.array([[1.0, -1.0], [-1.0, 1.0]])
         for i, m in enumerate(self.motor):
-            stiffness[m, m] += kp[i]
-            damping[m, m] += kd[i]
+            stiffness[m, m] += kp[i] * self._reaching[m]
+            damping[m, m] += kd[i] * self._reaching[m]
             if m != i:
                 stiffness[np.ix_([i, m], [i, m])] += k1[i] * between
                 damping[np.ix_([i, m], [i, m])] += d[i] * between
@@ -169,6 +182,9 @@ class ClosedLoop:
                 out[i] = torque
         if self.planted is not None:
             self.planted.add(time, elapsed, u, w, tau_motor, tau_spring, out)
+        for i, m, factor in self._demand:
+            load = tau_spring[i] if m != i else tau_spring[i] - self._load[i]  # what the bodies need comes later
+            out[m] = (out[m] + load) / factor - load
         return out
 
     def evaluate(self, time: float, bias: list[float], y: FloatArray) -> None:
@@ -236,7 +252,7 @@ class ClosedLoop:
         factor, info = dpotrf(matrix)
         if info != 0:
             raise SimulationError(self._not_positive(u))
-        drift = dposv(self._mass, bias_rate)[1]
+        drift = dposv(self._mass, bias_rate * self._reaching)[1]
         of.sides[:, size:] = self._mass
         solve = dpotrs(factor, of.sides)[0]
         rates[:] = w

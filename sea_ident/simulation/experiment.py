@@ -20,7 +20,7 @@ from sea_ident.simulation.excess import broken_limits
 from sea_ident.simulation.friction import FrictionJitter, FrictionLaw, SmoothCoulomb
 from sea_ident.simulation.passes import Clock, Passes
 from sea_ident.simulation.plant import Plant, PlantedEffect, plant_from_robot
-from sea_ident.simulation.planted import PlantedTorques, altered_robot, check_planted
+from sea_ident.simulation.planted import PlantedTorques, altered_robot, check_planted, demands
 from sea_ident.simulation.reference import HasSeries, Reference, as_reference
 from sea_ident.simulation.result import Simulation
 from sea_ident.simulation.rosenbrock import ros34pw2
@@ -152,7 +152,7 @@ def simulate(
     planted = PlantedTorques(plant.robot, effects, follow.begin) if effects else None
     if planted is not None and planted.idle:
         planted = None
-    system = ClosedLoop(plant, drive, motors, links, planted, method)
+    system = ClosedLoop(plant, drive, motors, links, planted, method, demands(plant.robot, effects))
     system.check_mass(state)
     system.accept(follow.begin - (lead_samples * clock.interval or clock.duration), state)
     passes = Passes(system, drive, clocks, method.nodes, follow.begin)

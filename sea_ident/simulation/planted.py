@@ -253,6 +253,14 @@ def altered_robot(robot: Robot, effects: Sequence[PlantedEffect]) -> Robot:
     return robot
 
 
+def demands(robot: Robot, effects: Sequence[PlantedEffect]) -> FloatArray:
+    """(n,) torque that each motor is asked for over what its load and its rotor need, with all effects [-]."""
+    factors = np.ones(robot.n)
+    for planted in effects:
+        factors *= planted.effect.demand(robot, planted.values)
+    return factors
+
+
 def check_planted(robot: Robot, effects: Sequence[PlantedEffect]) -> None:
     """Refuse effects that cannot act.
 

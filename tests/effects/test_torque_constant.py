@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from chains import rigid_chain
 
 import sea_ident
 from sea_ident import build_regressor
-from sea_ident.effects import State, base_effects, make_effect, spring_effects
+from sea_ident.effects import Anchor, State, base_effects, make_effect, spring_effects
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import FourierSeries, Motion
 from sea_ident.simulation import FrictionJitter, PlantedEffect, SensorNoise, SmoothCoulomb, plant_from_robot, simulate
@@ -32,21 +33,47 @@ def test_what_is_left_of_the_column_is_friction(leg):
     assert np.linalg.norm(without - motion.deflection[:, knee] * leg.spring("knee").stiffness) > 0.1
 
 
-def test_a_simulation_is_that_of_the_columns(leg):
-    series = FourierSeries(0.5, np.array([0.1, -0.3, 0.1]), 0.1 * np.eye(3), 0.1 * np.eye(3)[::-1])
-    effect = make_effect("torque_constant", "knee")
-    planted = [PlantedEffect(effect, np.array([ERROR]))]
+def simulated(robot, joint, series, error):
+    """Torque of the columns in the rows of the links and of the motors, and what was simulated, beside a spring."""
+    effects = make_effect("torque_constant", joint), make_effect("parallel_spring", joint)
+    values = np.array([error]), np.array([8.0, 1.0])
+    planted = [PlantedEffect(effect, value) for effect, value in zip(effects, values, strict=True)]
     quiet = {"sensors": SensorNoise.none(), "jitter": FrictionJitter.none(), "friction": SmoothCoulomb(0.01)}
-    run = simulate(leg, series, periods=1, effects=planted, **quiet)
-    own = (*base_effects(leg), *spring_effects(leg))
-    regressor = build_regressor(leg, (*own, effect), run.motion)
-    psi = np.append(plant_from_robot(leg).values_of(own), ERROR)
-    np.testing.assert_allclose(regressor.motor @ psi, run.tau_motor, atol=1e-9)
-    # that its carrier feels the rotor as it is, and not by the error, is left out: it is less by the gear ratio
-    rotor = make_effect("torque_constant", "knee").rotor_torque(State(leg, run.motion))
-    assert np.abs(regressor.link @ psi).max() < 0.1 * ERROR * np.abs(rotor).max()
+    run = simulate(robot, series, periods=1, effects=planted, start=series.motion(np.zeros(1)), **quiet)
+    own = (*base_effects(robot), *spring_effects(robot), effects[1])
+    psi = np.append(np.nan_to_num(plant_from_robot(robot).values_of(own[:-1])), values[1])
+    columns = [column.name for effect in own for column in effect.columns(robot)]
+    anchored = effects[0].anchored(Anchor(robot, own, dict(zip(columns, psi, strict=True))))
+    regressor = build_regressor(robot, (*own, anchored), run.motion)
+    psi = np.append(psi, error)
+    return regressor.link @ psi, regressor.motor @ psi, run
+
+
+@pytest.mark.parametrize("error", [ERROR, -0.4])
+def test_a_simulation_is_that_of_the_columns(leg, error):
+    """The carrier of the rotor feels it as it is, and not by the error."""
+    series = FourierSeries(0.5, np.array([0.1, -0.3, 0.1]), 0.1 * np.eye(3), 0.1 * np.eye(3)[::-1])
+    link, motor, run = simulated(leg, "knee", series, error)
+    np.testing.assert_allclose(motor, run.tau_motor, atol=1e-10)
+    np.testing.assert_allclose(link, 0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("error", [ERROR, -0.4])
+def test_a_simulation_of_a_rigid_joint_is_that_of_the_columns(error):
+    robot = rigid_chain(
+        ["0 0 1", "0 -1 0"],
+        ["0.02 0.01 -0.14", "0.02 0.01 -0.12"],
+        [2.0, 1.3],
+        'ixx="0.02" iyy="0.021" izz="0.004"',
+        ["0 0 1", "0 0 -0.3"],
+        "<mechanicalReduction>50</mechanicalReduction><rotorInertia>8e-5</rotorInertia>"
+        "<viscousFriction>0.4</viscousFriction><coulombFriction>0.4</coulombFriction>",
+    )
+    series = FourierSeries(0.5, np.array([0.1, 0.4]), 0.2 * np.eye(2), 0.1 * np.eye(2)[::-1])
+    link, motor, run = simulated(robot, "j1", series, error)
+    np.testing.assert_allclose(link + motor, run.tau_motor, atol=1e-9)
 
 
 def test_a_motor_does_not_turn_the_other_way(leg):
     with pytest.raises(EffectError, match=r"-1\.5 at 'knee'"):
-        make_effect("torque_constant", "knee").modified(leg, np.array([-1.5]))
+        make_effect("torque_constant", "knee").demand(leg, np.array([-1.5]))
