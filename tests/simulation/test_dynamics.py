@@ -7,7 +7,7 @@ from scipy.integrate import simpson, solve_ivp
 from sea_ident import Motion, build_regressor, load_robot
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.regressor import inverse_dynamics
-from sea_ident.simulation import PreslidingCoulomb, Settling, SmoothCoulomb, VelocityController, simulate
+from sea_ident.simulation import PlantedEffect, PreslidingCoulomb, Settling, SmoothCoulomb, VelocityController, simulate
 
 
 def full_model(robot):
@@ -98,6 +98,15 @@ def test_error_falls_with_a_power_of_the_step(leg, leg_series, quiet, exact, law
     errors = [np.abs(run.motion.q - runs[-1].motion.q).max() for run in runs[:-1]]
     assert np.log2(errors[0] / errors[1]) / 2.0 > least
     assert errors[0] < 3e-5
+
+
+@pytest.mark.parametrize("error", [0.5, -0.5])
+def test_the_order_stays_where_a_motor_is_asked_for_another_torque(leg, leg_series, quiet, exact, error):
+    planted = [PlantedEffect(make_effect("torque_constant", name), np.array([error])) for name in leg.joint_names]
+    options = {**quiet, "friction": SmoothCoulomb(0.03), "periods": 1, "start": exact.motion, "effects": planted}
+    runs = [simulate(leg, leg_series, step=0.005 / n, **options) for n in (1, 4, 16)]
+    errors = [np.abs(run.motion.q - runs[-1].motion.q).max() for run in runs[:-1]]
+    assert np.log2(errors[0] / errors[1]) / 2.0 > 2.5
 
 
 def test_energy_balance(leg, leg_series, quiet, exact):
