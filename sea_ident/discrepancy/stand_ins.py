@@ -44,6 +44,9 @@ CERTAIN = 5.0
 NOTHING = 3.0
 """Standard deviations within which a parameter is nothing."""
 
+NO_SPRING = 0.2
+"""Share of the torque of a spring (rms) below which the part that changes is, at most, where it is but a constant."""
+
 
 @dataclass(frozen=True)
 class StandIn(Unnamed):
@@ -69,7 +72,7 @@ def stand_ins(bench: Bench, selection: Selection) -> tuple[StandIn, ...]:
     fits = not selection.added or lack_of_fit(bench, selection.final)[2] >= LACK_LEVEL
     for position in range(len(fit.effects) - selection.added, len(fit.effects)):
         effect, words = fit.effects[position], ""
-        if isinstance(effect, ParallelSpring) and _is_nothing(bench, fit, position):
+        if isinstance(effect, ParallelSpring) and _is_constant(bench, fit, position, effect):
             words = "without any stiffness"
         elif slowest(effect) and not fits:
             words = too_slow(bench.robot, effect)
@@ -102,10 +105,20 @@ def _is_line(bench: Bench, fit: Fit, position: int, ripple: TorqueRipple) -> boo
     return bool(abs(fit.values[index]) < NOTHING * fit.std(index))
 
 
-def _is_nothing(bench: Bench, fit: Fit, position: int) -> bool:
-    """Whether the first parameter of an effect is zero within its standard deviation."""
-    index = sum(bench.counts(fit.effects)[:position])
-    return bool(abs(fit.values[index]) < NOTHING * fit.std(index))
+def _is_constant(bench: Bench, fit: Fit, position: int, spring: ParallelSpring) -> bool:
+    """Whether a spring has no stiffness as far as the data tell, and would show one that made it more than a constant.
+
+    Where the joint moves next to nothing, any stiffness is zero within its uncertainty.
+    """
+    first = sum(bench.counts(fit.effects)[:position])
+    stiffness, std, i = fit.values[first], fit.std(first), bench.robot.index(spring.required_joint)
+    if not abs(stiffness) < NOTHING * std:
+        return False
+    state = bench.state(fit.effects)
+    columns = spring.evaluate(state).link[:, i]
+    whole = columns @ fit.values[first : first + columns.shape[1]]
+    most = (abs(stiffness) + NOTHING * std) * float(np.std(columns[:, 0]))
+    return bool(most < NO_SPRING * np.sqrt(np.mean(whole**2)))
 
 
 def _in_another_spring(bench: Bench, fit: Fit, position: int, play: Backlash) -> str:

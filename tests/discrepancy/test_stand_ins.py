@@ -14,9 +14,10 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.judge import slowest
 from sea_ident.discrepancy.search import Selection
 from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.discrepancy.stand_ins import stand_ins, too_slow
+from sea_ident.discrepancy.stand_ins import NOTHING, stand_ins, too_slow
 from sea_ident.effects import Effect, make_effect
 from sea_ident.exceptions import SeaIdentWarning
+from sea_ident.motion import FourierSeries
 
 KNEE = 1
 
@@ -107,6 +108,21 @@ def test_a_parallel_spring_without_stiffness_is_none(laboratory, stiffness, said
     there = stand_ins(bench, found(bench, make_effect("parallel_spring", "knee")))
     assert len(there) == said
     assert all("without any stiffness" in one.sentence for one in there)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("values", "said"), [((45.0, 9.0), 0), pytest.param((0.0, 5.0), 1, marks=pytest.mark.slow)])
+def test_a_parallel_spring_is_one_where_the_motion_is_too_small_to_tell_its_stiffness(laboratory, series, values, said):
+    """It was said to have none, and not to be in the library: nothing is zero that is known that badly."""
+    small = tuple(FourierSeries(m.base_frequency, m.offset, 0.2 * m.a, 0.2 * m.b) for m in series)
+    weak, joint = replace(laboratory, motions=small), "knee" if said else "hip"
+    bench = weak.bench(weak.record([("parallel_spring", joint, values, {})]))
+    selection = found(bench, make_effect("parallel_spring", joint))
+    fit = selection.final.fit
+    stiffness = fit.values[len(fit.values) - 2]
+    assert abs(stiffness - values[0]) < NOTHING * fit.std(len(fit.values) - 2)
+    assert abs(stiffness) < NOTHING * fit.std(len(fit.values) - 2)
+    assert len(stand_ins(bench, selection)) == said
 
 
 @pytest.mark.scenario
