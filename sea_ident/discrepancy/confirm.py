@@ -13,7 +13,7 @@ from sea_ident.discrepancy.judge import SMALLEST_SHARE, flat_steps, scatter_p, s
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
 from sea_ident.discrepancy.search import HOPELESS, MOST_EFFECTS, SLOW, Selection, search, without
-from sea_ident.discrepancy.settle import Settled, settle_again
+from sea_ident.discrepancy.settle import Settled, settle_again, settled_elsewhere
 from sea_ident.discrepancy.taken_up import taken_up
 from sea_ident.effects import Side
 from sea_ident.side_by_side import side_by_side
@@ -56,7 +56,7 @@ class Confirmed:
 
     def less(self, selection: Selection) -> "Confirmed":
         """The same with less found."""
-        final = settle_again(self.bench, selection.final.fit) if selection.added else self.start
+        final = settled_elsewhere(self.bench, selection.final.fit) if selection.added else self.start
         return replace(self, selection=selection, final=final)
 
 
@@ -78,7 +78,7 @@ def confirm(bench: Bench, selection: Selection) -> Confirmed:
     start = settle_again(away, selection.start.fit)
     if not selection.added:
         return Confirmed(selection, away, start, start)
-    final = settle_again(away, selection.final.fit)
+    final = settled_elsewhere(away, selection.final.fit)
     steps = flat_steps(away, final)
     first = len(final.fit.effects) - selection.added
     motors = len({c.effect.joint for c in selection.candidates if c.effect.side is Side.MOTOR})
@@ -150,7 +150,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     if np.any(np.mean(data.left_out, axis=0) > MOST_LEFT_OUT):
         return None
     far = bench.comparing(data)
-    before = settle_again(far, confirmed.final.fit)
+    before = settled_elsewhere(far, confirmed.final.fit)
     first = before.fit
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
     # a search gives up where the next effect leaves so much: none need begin

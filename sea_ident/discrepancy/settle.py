@@ -30,6 +30,12 @@ NEARLY_LOST = 0.05
 """Share of the stiffness of a first fit below which a spring is as good as lost [-]: a step of a fit seldom passes
 `LEAST_STIFFNESS`, and one that loses a spring ends there."""
 
+LEAVES_MORE = 1.2
+"""Factor by which the statistic over degrees of freedom may grow where fewer samples are compared [-]."""
+
+STANDS = 0.98
+"""Ratio of two statistics in turn from which on there is nothing to gain by another floor [-]."""
+
 ANCHORED = 0.3
 """Size, in standard deviations of the noise, of a change that effects are not made to follow any more [-]: an estimate
 is off by that at most, ..."""
@@ -101,6 +107,22 @@ def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Set
         if bent.excess > BENT * straight.excess and far_from(bent.effects, bench.effects):
             return Settled(straight, noise)
     return Settled(bent, noise)
+
+
+def settled_elsewhere(bench: Bench, fit: Fit) -> Settled:
+    """A model that was settled with other samples left out, settled in these.
+
+    The first floor is that of its residual as it was there. A model that explained all there and leaves more here may
+    be held against a floor that is not its own: the next one tells.
+    """
+    now = settle_again(bench, fit)
+    for _ in range(MORE_ROUNDS):
+        if fit.statistic > FAR * fit.dof or now.fit.statistic / now.fit.dof < LEAVES_MORE * fit.statistic / fit.dof:
+            break
+        before, now = now, settle_again(bench, now.fit)
+        if now.fit.statistic > STANDS * before.fit.statistic:
+            break
+    return now
 
 
 def settled_in_form(

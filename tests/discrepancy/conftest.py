@@ -89,6 +89,13 @@ def laboratory(leg, series):
 
 
 @pytest.fixture(scope="session")
+def small_motions(laboratory, series):
+    """The leg on a fifth of its motions, in which little is seen and the ankle stands for half of the time."""
+    small = tuple(FourierSeries(m.base_frequency, m.offset, 0.2 * m.a, 0.2 * m.b) for m in series)
+    return replace(laboratory, motions=small)
+
+
+@pytest.fixture(scope="session")
 def prosthesis(laboratory):
     """A robot whose ankle carries a light foot, and whose springs hardly deflect, with two motions of its own."""
     robot = sea_ident.load_robot(PROSTHESIS)

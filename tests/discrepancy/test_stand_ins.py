@@ -17,7 +17,6 @@ from sea_ident.discrepancy.settle import Settled, settle, settle_again
 from sea_ident.discrepancy.stand_ins import NOTHING, stand_ins, too_slow
 from sea_ident.effects import Effect, make_effect
 from sea_ident.exceptions import SeaIdentWarning
-from sea_ident.motion import FourierSeries
 
 KNEE = 1
 
@@ -112,11 +111,10 @@ def test_a_parallel_spring_without_stiffness_is_none(laboratory, stiffness, said
 
 @pytest.mark.scenario
 @pytest.mark.parametrize(("values", "said"), [((45.0, 9.0), 0), pytest.param((0.0, 5.0), 1, marks=pytest.mark.slow)])
-def test_a_parallel_spring_is_one_where_the_motion_is_too_small_to_tell_its_stiffness(laboratory, series, values, said):
+def test_a_parallel_spring_is_one_where_the_motion_is_too_small_to_tell_its_stiffness(small_motions, values, said):
     """It was said to have none, and not to be in the library: nothing is zero that is known that badly."""
-    small = tuple(FourierSeries(m.base_frequency, m.offset, 0.2 * m.a, 0.2 * m.b) for m in series)
-    weak, joint = replace(laboratory, motions=small), "knee" if said else "hip"
-    bench = weak.bench(weak.record([("parallel_spring", joint, values, {})]))
+    joint = "knee" if said else "hip"
+    bench = small_motions.bench(small_motions.record([("parallel_spring", joint, values, {})]))
     selection = found(bench, make_effect("parallel_spring", joint))
     fit = selection.final.fit
     stiffness = fit.values[len(fit.values) - 2]
