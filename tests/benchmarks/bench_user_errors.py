@@ -4,10 +4,11 @@
     python tests/benchmarks/bench_user_errors.py rates
 
 Zeros of encoders and joints off by degrees, read finely and by steps that repeat; a robot that leans; delays of a
-wrong clock; torque constants off by a third; a push; on the elastic leg and on a prosthesis, simulated with noise, and
-with a second motion held out. Printed per case: whether it is right (the truth is named, or among the alternatives, and
-nothing else is named), the verdict, what is named, the truth, and the seconds of the diagnosis. At the end, how many
-are right in each group. `rates` prints the seconds of `identify` and `diagnose` at several sampling rates instead.
+wrong clock; torque constants off by a third; a push; on the elastic leg, also where it hardly moves, and on a
+prosthesis, simulated with noise, and with a second motion held out. Printed per case: whether it is right (the truth is
+named, or among the alternatives, and nothing else is named), the verdict, what is named, the truth, and the seconds of
+the diagnosis. At the end, how many are right in each group. `rates` prints the seconds of `identify` and `diagnose` at
+several sampling rates instead.
 """
 
 import json
@@ -50,6 +51,7 @@ class Case:
         shape: its shapes and amounts.
         robot: `leg` or `prosthesis`.
         coarse: whether the encoders of the links are.
+        motion: share of the usual motion [-].
     """
 
     group: str
@@ -59,6 +61,7 @@ class Case:
     shape: Mapping[str, float] = field(default_factory=dict)
     robot: str = "leg"
     coarse: bool = False
+    motion: float = 1.0
 
 
 def cases() -> Iterator[Case]:
@@ -105,6 +108,11 @@ def cases() -> Iterator[Case]:
     push = {"start": 1.0, "stop": 1.7, "period": PERIOD}
     yield Case("prosthesis", "external_force", "ankle", (8.0, 3.0, -5.0), push, robot="prosthesis")
     yield Case("prosthesis", "stribeck_friction", "knee", (1.0,), {"speed": 0.08}, robot="prosthesis")
+    yield Case("small-motion", "parallel_spring", "hip", (45.0, 9.0), motion=0.2)
+    yield Case("small-motion", "spring_offset", "knee", (6.0,), motion=0.2)
+    yield Case("small-motion", "motor_encoder_offset", "knee", shape={"offset": -0.03}, motion=0.2)
+    yield Case("small-motion", "torque_ripple", "ankle", (1.0, 0.5), {"order": 12.0}, motion=0.2)
+    yield Case("small-motion", "torque_ripple", "knee", (2.0, 1.0), {"order": 12.0}, motion=0.2)
 
 
 @cache
@@ -129,7 +137,8 @@ def robot_and_motions(name: str) -> tuple[Robot, tuple[FourierSeries, FourierSer
 
 def told(case: Case) -> tuple[Diagnosis, float]:
     """What is said of a case, and in how many seconds."""
-    robot, motions = robot_and_motions(case.robot)
+    robot, usual = robot_and_motions(case.robot)
+    motions = [FourierSeries(m.base_frequency, m.offset, case.motion * m.a, case.motion * m.b) for m in usual]
     planted = [PlantedEffect(make_effect(case.effect, case.joint, **case.shape), np.array(case.values))]
     sensors = COARSE if case.coarse else None
     recording, other = (
@@ -189,6 +198,7 @@ def main() -> None:
             continue
         what = f"{case.effect} at {case.joint or case.robot} {[*case.values, *case.shape.values()]}"
         what += ", coarse" if case.coarse else ""
+        what += f", {case.motion:g} of the motion" if case.motion != 1.0 else ""
         count[case.group] += 1
         try:
             found, seconds = told(case)
