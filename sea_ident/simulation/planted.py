@@ -85,7 +85,8 @@ class PlantedTorques:
         self._rigid = ~np.array(robot.elastic, dtype=bool)
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
-        self.needs_load = any(isinstance(p.effect, LoadEffect) and p.effect.joint in rigid for p in acting)
+        by_load = (p.effect for p in acting if isinstance(p.effect, LoadEffect) and not overrides(p.effect, "demand"))
+        self.needs_load = any(effect.joint in rigid for effect in by_load)
         self.idle = not hooks
         self._state = _states(n)
         self._link, self._torque = np.zeros(n), np.zeros(n)
@@ -274,5 +275,5 @@ def check_planted(robot: Robot, effects: Sequence[PlantedEffect]) -> None:
                 f"the effect {effect.name!r} has {len(columns)} parameters "
                 f"({', '.join(c.name for c in columns)}); {np.shape(planted.values)} values were given"
             )
-        if not any(overrides(effect, hook) for hook in ("torque", "measured", "modified")):
+        if not any(overrides(effect, hook) for hook in ("torque", "measured", "modified", "demand")):
             raise SimulationError(f"the effect {effect.name!r} has no way to act in a simulation")

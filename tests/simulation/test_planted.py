@@ -10,6 +10,7 @@ from sea_ident import SeaIdentError, build_regressor
 from sea_ident.effects import (
     Anchor,
     Column,
+    Effect,
     JointEffect,
     Side,
     base_effects,
@@ -233,6 +234,43 @@ def test_effects_of_others_see_the_time_of_the_recording(leg, leg_series, quiet)
     regressor = build_regressor(leg, own, run.motion)
     push = (regressor.link @ plant_from_robot(leg).values_of(own))[:, 0]
     np.testing.assert_allclose(push, 3.0 * np.sin(3.0 * run.motion.time), atol=1e-10)
+
+
+@dataclass(frozen=True)
+class Weaker(Effect):
+    """All motors give less than they are asked for, and nothing else acts."""
+
+    name: ClassVar[str] = "weaker"
+    side: ClassVar[Side] = Side.MOTOR
+    source: ClassVar[str] = "this test"
+
+    def columns(self, robot):
+        return (Column(self.parameter_name(), "-", self.name, None, self.side),)
+
+    def evaluate(self, state):
+        raise AssertionError("nobody asks for it")
+
+    def demand(self, robot, values):
+        return np.full(robot.n, 1.0 + values[0])
+
+
+def test_motors_that_are_asked_for_more_are_that_by_any_effect(leg, leg_series, quiet, exact):
+    """One that only says so acts, as those of the single motors do; what two ask for is multiplied."""
+    each = [PlantedEffect(make_effect("torque_constant", name), np.array([0.32])) for name in leg.joint_names]
+    all_at_once = [PlantedEffect(Weaker(), np.array([0.2])), PlantedEffect(Weaker(), np.array([0.1]))]
+    one, other = (
+        simulate(leg, leg_series, periods=1, effects=planted, start=exact.motion, **quiet)
+        for planted in (each, all_at_once)
+    )
+    np.testing.assert_allclose(one.tau_motor, other.tau_motor, atol=1e-9)
+    assert np.abs(one.tau_motor - exact.tau_motor[: len(one.tau_motor)]).max() > 0.5
+
+
+def test_only_what_acts_by_the_load_of_a_rigid_joint_needs_it():
+    robot = ur10()
+    for name, needed in (("torque_constant", False), ("load_dependent_friction", True)):
+        planted = [PlantedEffect(make_effect(name, robot.joint_names[1]), np.array([0.1]))]
+        assert PlantedTorques(robot, planted, 0.0).needs_load == needed
 
 
 def test_wrong_number_of_values_is_refused(leg, leg_series):
