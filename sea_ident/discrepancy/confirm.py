@@ -150,7 +150,7 @@ def without_the_slow(bench: Bench, confirmed: Confirmed) -> Confirmed | None:
     if np.any(np.mean(data.left_out, axis=0) > MOST_LEFT_OUT):
         return None
     far = bench.comparing(data)
-    before = settled_elsewhere(far, confirmed.final.fit)
+    before = settle_again(far, confirmed.final.fit)
     first = before.fit
     most = max((candidate.gain for candidate in scan(far, first, before.noise)), default=0.0)
     # a search gives up where the next effect leaves so much: none need begin
