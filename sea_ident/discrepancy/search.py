@@ -21,7 +21,14 @@ from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, next_effect, visib
 from sea_ident.discrepancy.one_for_two import one_for_two
 from sea_ident.discrepancy.physics import possible
 from sea_ident.discrepancy.placements import with_placements
-from sea_ident.discrepancy.settle import Settled, anchored_in_itself, settle, settle_again, settled_in_form
+from sea_ident.discrepancy.settle import (
+    Settled,
+    anchored_in_itself,
+    settle,
+    settle_again,
+    settled_down,
+    settled_in_form,
+)
 from sea_ident.discrepancy.slips import by_the_first_element
 from sea_ident.effects import Effect, JointEffect
 from sea_ident.side_by_side import side_by_side
@@ -34,9 +41,6 @@ NOT_ASKED = float("nan")
 
 WIDER_BEFORE = 3
 """Effects before which it is asked whether signals of all joints are late, or joints elsewhere."""
-
-MOST_SETTLINGS = 3
-"""Rounds in which effects that depend on the model, and the noise floor, follow an effect that was added."""
 
 FAR_FROM_RIGHT = 30.0
 """Statistic over degrees of freedom beyond which others are tried in the place of what was added only when there is
@@ -156,7 +160,7 @@ def search(
         more = len(new.effects) - len(now.fit.effects)
         added.extend([p_value] * more)
         before = now
-        now = _settled(bench, settle_again(bench, new))
+        now = settled_down(bench, settle_again(bench, new))
         waits = now.fit.statistic > FAR_FROM_RIGHT * now.fit.dof and _possible(bench, now, len(added))
         now = formed(bench, now) if waits else _improved(bench, now, len(added), tried, ruled_out)
         if not _possible(bench, now, len(added)):
@@ -228,17 +232,7 @@ def _improved(bench: Bench, now: Settled, added: int, tried: Tried, ruled_out: C
     """
     now = formed(bench, now)
     exchanged = exchange(bench, now, added, tried, ruled_out)
-    return now if exchanged is now else formed(bench, _settled(bench, exchanged))
-
-
-def _settled(bench: Bench, now: Settled) -> Settled:
-    """A model with its noise floor and what depends on its parameters, followed until they stand still."""
-    for _ in range(MOST_SETTLINGS):
-        before = now.fit.statistic / now.fit.dof
-        now = settle_again(bench, now.fit)
-        if now.fit.statistic / now.fit.dof > 0.98 * before:
-            break
-    return now
+    return now if exchanged is now else formed(bench, settled_down(bench, exchanged))
 
 
 def _largest_changes(bench: Bench, fit: Fit, added: int) -> FloatArray:

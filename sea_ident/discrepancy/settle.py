@@ -34,7 +34,10 @@ LEAVES_MORE = 1.2
 """Factor by which the statistic over degrees of freedom may grow where fewer samples are compared [-]."""
 
 STANDS = 0.98
-"""Ratio of two statistics in turn from which on there is nothing to gain by another floor [-]."""
+"""Ratio of two statistics over degrees of freedom in turn from which on a model stands still [-], ..."""
+
+MOST_SETTLINGS = 3
+"""... or rounds after which it is as it is."""
 
 ANCHORED = 0.3
 """Size, in standard deviations of the noise, of a change that effects are not made to follow any more [-]: an estimate
@@ -109,20 +112,25 @@ def settle_again(bench: Bench, fit: Fit, noise: NoiseFloor | None = None) -> Set
     return Settled(bent, noise)
 
 
+def settled_down(bench: Bench, now: Settled) -> Settled:
+    """A model with its noise floor and what depends on its parameters, followed until they stand still."""
+    for _ in range(MOST_SETTLINGS):
+        before = now.fit
+        now = settle_again(bench, before)
+        if now.fit.statistic / now.fit.dof > STANDS * before.statistic / before.dof:
+            break
+    return now
+
+
 def settled_elsewhere(bench: Bench, fit: Fit) -> Settled:
     """A model that was settled with other samples left out, settled in these.
 
     The first floor is that of its residual as it was there. A model that explained all there and leaves more here may
-    be held against a floor that is not its own: the next one tells.
+    be held against a floor that is not its own: those after it tell.
     """
     now = settle_again(bench, fit)
-    for _ in range(MORE_ROUNDS):
-        if fit.statistic > FAR * fit.dof or now.fit.statistic / now.fit.dof < LEAVES_MORE * fit.statistic / fit.dof:
-            break
-        before, now = now, settle_again(bench, now.fit)
-        if now.fit.statistic > STANDS * before.fit.statistic:
-            break
-    return now
+    leaves_more = now.fit.statistic / now.fit.dof > LEAVES_MORE * fit.statistic / fit.dof
+    return settled_down(bench, now) if fit.statistic < FAR * fit.dof and leaves_more else now
 
 
 def settled_in_form(

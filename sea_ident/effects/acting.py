@@ -53,6 +53,10 @@ class Action(Protocol):
         """Add its torque to the link rows (n,) and the motor rows (n,), with the sign of `Effect.evaluate`."""
 
 
+def no_torque(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
+    """Add nothing: what acts otherwise, in bodies or in a sensor, gives this action, and is not asked for torques."""
+
+
 class JointAction:
     """An action at a single joint: columns that depend on the time and the state of that joint alone, times values.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Anchor, Column, Effect, Shape
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.effects.unfelt_moments import level_axes, sideways, sideways_torque, unfelt_moments
@@ -183,7 +183,7 @@ class BaseTilt(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""
-        return lambda state, link, motor: None
+        return no_torque
 
     def modified(self, robot: Robot, values: FloatArray) -> Robot:
         """The robot with its gravity turned, and with the first moments that this was found with."""

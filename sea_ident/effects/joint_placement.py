@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Anchor, Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
@@ -126,7 +126,7 @@ class JointPlacement(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""
-        return lambda state, link, motor: None
+        return no_torque
 
     def modified(self, robot: Robot, values: FloatArray) -> Robot:
         """The robot with the joint there, and bodies that need there what those need that it was found with.

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
@@ -46,7 +46,7 @@ class Payload(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `modified`."""
-        return lambda state, link, motor: None
+        return no_torque
 
     def modified(self, robot: Robot, values: FloatArray) -> Robot:
         """The robot that carries it."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.robot import INERTIAL_UNITS, Robot
@@ -48,4 +48,4 @@ class RigidBodies(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """Nothing to add: the simulator integrates the bodies themselves."""
-        return lambda state, link, motor: None
+        return no_torque

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Column, Effect
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.robot import Robot
@@ -51,7 +51,7 @@ class RotorInertia(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """Nothing to add: the simulator integrates the rotors themselves."""
-        return lambda state, link, motor: None
+        return no_torque
 
     @staticmethod
     def _membership(robot: Robot) -> FloatArray:

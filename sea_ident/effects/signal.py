@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Column, Effect, Shape
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
@@ -42,7 +42,7 @@ class SignalEffect(Effect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `measured`."""
-        return lambda state, link, motor: None
+        return no_torque
 
     @abstractmethod
     def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

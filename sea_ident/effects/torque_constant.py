@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.acting import Action
+from sea_ident.effects.acting import Action, no_torque
 from sea_ident.effects.base import Column
 from sea_ident.effects.load import MotorLoadEffect
 from sea_ident.effects.state import Contribution, Side, State
@@ -41,7 +41,7 @@ class TorqueConstant(MotorLoadEffect):
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """None: it acts in `demand`."""
-        return lambda state, link, motor: None
+        return no_torque
 
     def demand(self, robot: Robot, values: FloatArray) -> FloatArray:
         """As much more at its motor as is recorded.

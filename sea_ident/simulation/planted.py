@@ -7,7 +7,7 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects import Effect, Side, SimulationState
-from sea_ident.effects.acting import Action, JointAction
+from sea_ident.effects.acting import Action, JointAction, no_torque
 from sea_ident.effects.load import LoadEffect
 from sea_ident.exceptions import SimulationError
 from sea_ident.robot import Robot
@@ -71,8 +71,10 @@ class PlantedTorques:
         self._begin = begin
         coordinates = motor_coordinates(robot)
         self._motor, self._sides = np.array(coordinates, dtype=np.intp), list(enumerate(coordinates))
-        acting = [p for p in effects if p.effect.side is not Side.SENSOR and overrides(p.effect, "torque")]
-        hooks = [(p.effect.side, p.effect.torque(robot, p.values)) for p in acting]
+        torques = [p for p in effects if p.effect.side is not Side.SENSOR and overrides(p.effect, "torque")]
+        acting = [(p.effect, p.effect.torque(robot, p.values)) for p in torques]
+        acting = [(effect, hook) for effect, hook in acting if hook is not no_torque]
+        hooks = [(effect.side, hook) for effect, hook in acting]
         # Springs and links first: the others may depend on the torque that springs transmit and rigid joints carry.
         self._joint_springs, self._springs = _by_kind([h for side, h in hooks if side is Side.SPRING], coordinates)
         self._joint_links, self._links = _by_kind([h for side, h in hooks if side is Side.LINK], coordinates)
@@ -85,8 +87,7 @@ class PlantedTorques:
         self._rigid = ~np.array(robot.elastic, dtype=bool)
         self._memory = [hook.accept for _, hook in hooks if hasattr(hook, "accept")]
         rigid = {joint.name for joint in robot.joints if not joint.elastic}
-        by_load = (p.effect for p in acting if isinstance(p.effect, LoadEffect) and not overrides(p.effect, "demand"))
-        self.needs_load = any(effect.joint in rigid for effect in by_load)
+        self.needs_load = any(isinstance(effect, LoadEffect) and effect.joint in rigid for effect, _ in acting)
         self.idle = not hooks
         self._state = _states(n)
         self._link, self._torque = np.zeros(n), np.zeros(n)

@@ -132,11 +132,13 @@ def test_a_constant_torque_that_cancels_the_load_is_not_taken_for_a_wrong_zero(p
 
 
 @pytest.mark.scenario
-@pytest.mark.parametrize(("planted", "kind"), [("torque_offset", "torque_offset"), ("motor_encoder_offset", "zero")])
-def test_a_search_begins_with_a_zero_or_with_a_constant_that_explains_more(prosthesis, planted, kind):
-    amounts = ([3.0], {}) if kind == "torque_offset" else ([], {"offset": 0.05})
-    bench = prosthesis.bench(prosthesis.record([(planted, "knee", *amounts)], periods=10))
-    begun = begun_with_zeros(bench, [MotorEncoderOffset("knee", offset=-0.015 if kind == "torque_offset" else 0.04)])
+@pytest.mark.parametrize(
+    ("name", "values", "shape", "begun_at"),
+    [("torque_offset", [3.0], {}, -0.015), ("motor_encoder_offset", [], {"offset": 0.05}, 0.04)],
+)
+def test_a_search_begins_with_a_zero_or_with_a_constant_that_explains_more(prosthesis, name, values, shape, begun_at):
+    bench = prosthesis.bench(prosthesis.record([(name, "knee", values, shape)], periods=10))
+    begun = begun_with_zeros(bench, [MotorEncoderOffset("knee", offset=begun_at)])
     (effect,) = begun.effects
-    assert (effect.name, effect.joint) == (planted, "knee")
+    assert (effect.name, effect.joint) == (name, "knee")
     assert begun.final.fit.statistic < 1.5 * begun.final.fit.dof

@@ -61,14 +61,16 @@ def pendulum():
     )
 
 
-def test_elastic_pendulum_against_its_equations_written_by_hand(quiet):
+@pytest.mark.parametrize("error", [0.0, 0.5, -0.5])
+def test_elastic_pendulum_against_its_equations_written_by_hand(quiet, error):
+    """Also with a motor that gives another torque than it is asked for."""
     robot = pendulum()
     controller = Wave((6.0,), 9.0, (40.0,), (2.0,))
     motion = Motion.rigid(np.linspace(0.0, 2.0, 401), *(np.zeros((401, 1)) for _ in range(3)))
     start = Motion(np.zeros(1), *(np.full((1, 1), v) for v in (0.3, -0.5, 0.0, 0.35, 0.2, 0.0)))
-    simulation = simulate(
-        robot, motion, controller=controller, start=start, step=3.125e-4, **{**quiet, "friction": SmoothCoulomb(0.05)}
-    )
+    planted = [PlantedEffect(make_effect("torque_constant", robot.joint_names[0]), np.array([error]))]
+    options = {**quiet, "friction": SmoothCoulomb(0.05), "effects": planted}
+    simulation = simulate(robot, motion, controller=controller, start=start, step=3.125e-4, **options)
 
     inertia, moment, reflected = 0.04 + 2.0 * 0.3**2, 2.0 * 0.3, 80.0**2 * 3e-5
 
@@ -77,7 +79,12 @@ def test_elastic_pendulum_against_its_equations_written_by_hand(quiet):
         spring = 150.0 * (theta - q) + 3000.0 * (theta - q) ** 3 + 0.7 * (dtheta - dq)
         drive = 6.0 * np.cos(9.0 * t) - 40.0 * theta - 2.0 * dtheta
         friction = 0.4 * dtheta + 0.6 * np.tanh(dtheta / 0.05)
-        return [dq, dtheta, (spring - moment * 9.81 * np.sin(q)) / inertia, (drive - friction - spring) / reflected]
+        return [
+            dq,
+            dtheta,
+            (spring - moment * 9.81 * np.sin(q)) / inertia,
+            ((drive - friction) / (1.0 + error) - spring) / reflected,
+        ]
 
     truth = solve_ivp(
         rates, (0.0, 2.0), [0.3, 0.35, -0.5, 0.2], "LSODA", simulation.motion.time, rtol=1e-10, atol=1e-12
