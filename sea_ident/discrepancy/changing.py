@@ -1,5 +1,6 @@
 """What changes from period to period of one recording, for all that is asked about it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,17 +12,55 @@ from sea_ident.discrepancy.data import PeriodData, spectrum
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.heldout import HeldOut
-from sea_ident.discrepancy.noise import stacked
+from sea_ident.discrepancy.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.noise import ComplexArray, stacked
 from sea_ident.discrepancy.trend import TrendTest, compare_periods
 from sea_ident.discrepancy.trend_directions import Name, steady_rows
 from sea_ident.discrepancy.trend_gap import trend_gap
 from sea_ident.discrepancy.trend_terms import trend_terms
-from sea_ident.discrepancy.trend_within import changes, of_joint, within_periods
+from sea_ident.discrepancy.trend_within import mean_course, of_joint, within_periods
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Changed:
+    """A trend of a model, and how far it has changed in the mean of another recording.
+
+    Attributes:
+        term: the trend, none in the mean of the recording that it was found in.
+        course: (N,) its change over the mean period there.
+        torque: (N, E) what it does there beyond a model that is that of the mean here [N m] or [N].
+    """
+
+    term: TrendTerm
+    course: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Elsewhere:
+    """What has changed in another recording.
+
+    Attributes:
+        changed: what is known to have.
+        notes: what a user should know.
+    """
+
+    changed: tuple[Changed, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def throughout(self) -> tuple[tuple[Effect, FloatArray], ...]:
+        """Effects with their values that do the same in a simulation of its mean."""
+        return tuple(
+            steady
+            for one in self.changed
+            for steady in one.term.effect.throughout(np.array(one.term.values), float(np.mean(one.course)))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,24 +100,30 @@ class Changing:
         """Trends as a model holds them."""
         return trend_terms(bench, fit, trends.trends, self.temperature)
 
-    def followed(self, bench: Bench, fit: Fit, trends: TrendTest, held: HeldOut | None) -> HeldOut | None:
-        """Data that were held out, with what a measured signal makes of a model there that is that of the mean here.
+    def elsewhere(self, bench: Bench, fit: Fit, trends: TrendTest, held: HeldOut | None) -> Elsewhere:
+        """What has changed by how much in the mean of data that were held out, as far as that is known.
 
-        A drift by time may go on from anywhere, so that it predicts nothing of another recording.
+        What follows a measured signal is. A drift by time may go on from anywhere; whether it began anew with the
+        recording, those data say: it did if it explains more of them than if nothing drifted.
         """
         if held is None or held.recording is None or not trends.trends:
-            return held
+            return Elsewhere()
         data, after = held.bench.data, held.after
         temperature = check.temperatures(held.recording, data)
-        torque = np.zeros((data.samples, len(data.equations)))
+        found = []
         for term in self.terms(bench, fit, trends):
-            if term.effect.follows is None or not _measured(data, term.effect, temperature):
+            if not _measured(data, term.effect, temperature):
                 continue
-            change = changes(data, term.effect, temperature).mean(axis=0)
+            course = mean_course(data, term.effect, temperature)
             rows = data.rows(steady_rows(held.bench, after, term.effect))
-            torque += change[:, None] * (rows @ np.array(term.values))
-        residual = after.residual - spectrum(torque, data.harmonics)
-        return replace(held, after=replace(after, residual=residual, whitened=stacked(residual)))
+            found.append(Changed(term, course, course[:, None] * (rows @ np.array(term.values))))
+        known = tuple(one for one in found if one.term.effect.follows is not None)
+        apart = _left(held, found) - _left(held, known)
+        if apart < 0.0:
+            return Elsewhere(tuple(found))
+        by_time = [one.term.effect.title for one in found if one not in known]
+        told = (words.did_not_begin_anew(by_time, held.source),) if apart > EQUALLY_GOOD * held.now.fit.unit else ()
+        return Elsewhere(known, told)
 
     def gaps(self, bench: Bench, fit: Fit, trends: TrendTest, held: HeldOut | None) -> dict[str, Gap]:
         """How far periods differ before and after it is known what changes, here and in another recording."""
@@ -89,6 +134,28 @@ class Changing:
             if all(_measured(held.bench.data, effect, temperature) for effect in effects):
                 found["holdout"] = trend_gap(held.bench, held.after, trends.trends, temperature)
         return {label: gap for label, gap in found.items() if gap is not None}
+
+
+def followed(held: HeldOut | None, changed: Sequence[Changed]) -> HeldOut | None:
+    """Data that were held out, with what has changed there in a model that is that of the mean of another recording."""
+    if held is None or not changed:
+        return held
+    residual = _residual(held, changed)
+    return replace(held, after=replace(held.after, residual=residual, whitened=stacked(residual)))
+
+
+def _residual(held: HeldOut, changed: Sequence[Changed]) -> ComplexArray:
+    """(H + 1, E) what is left of data that were held out where that has changed [N m] or [N]."""
+    torque = np.zeros((held.bench.data.samples, len(held.bench.data.equations)))
+    for one in changed:
+        torque += one.torque
+    return np.asarray(held.after.residual - spectrum(torque, held.bench.data.harmonics))
+
+
+def _left(held: HeldOut, changed: Sequence[Changed]) -> float:
+    """The same in terms of the noise there, squared and summed [-]."""
+    left = held.bench.whitening(held.noise).flat(_residual(held, changed) * held.after.scale)
+    return float(np.sum(left**2))
 
 
 def _measured(data: PeriodData, effect: Effect, temperature: FloatArray | None) -> bool:

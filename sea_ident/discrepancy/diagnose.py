@@ -10,7 +10,7 @@ from sea_ident.discrepancy.against import against
 from sea_ident.discrepancy.base_model import completed
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.breakaway import stiction
-from sea_ident.discrepancy.changing import Changing
+from sea_ident.discrepancy.changing import Changing, followed
 from sea_ident.discrepancy.circular import circular_springs
 from sea_ident.discrepancy.columns import Key, effect_key
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude
@@ -192,7 +192,8 @@ def _diagnosed(
     tell("simulating", 0.85)
     after = (as_identified, selection.final.fit)
     before = (processed, selection.start.fit) if selection.added else None
-    repaired = repair(model, after, before, held, recording, processed, controller)
+    there = changing.elsewhere(bench, selection.final.fit, trends, held)
+    repaired = repair(model, after, before, held, recording, processed, controller, there.throughout)
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held), *_on_centres(bench, selection))
     of_springs = (
         *doubts_of_springs(robot, model.springs),
@@ -201,11 +202,20 @@ def _diagnosed(
     )
     of_sensors, limited = limits(confirmed.bench, confirmed.start, processed.encoder_steps, confirmed.final)
     basic_notes = (*of_sensors, *of_springs, *(() if basic is None else basic.warnings))
-    steady = changing.not_shown_by(trends)
-    said = (*notes.warnings, *found.notes, *basic_notes, *spoken, *steady, *held_notes, *change_notes, *repaired.notes)
+    of_drifts = (*changing.not_shown_by(trends), *there.notes)
+    said = (
+        *notes.warnings,
+        *found.notes,
+        *basic_notes,
+        *spoken,
+        *of_drifts,
+        *held_notes,
+        *change_notes,
+        *repaired.notes,
+    )
     notes = replace(notes, warnings=said, limited=limited, apart=bool(apart))
     tell("writing it down", 0.95)
-    held = changing.followed(bench, selection.final.fit, trends, held)
+    held = followed(held, there.changed)
     diagnosis = conclude(bench, confirmed, trends, alternatives, held, change, notes, nameless)
     if diagnosis.training is not None:
         repaired = repaired.changing(changing.terms(bench, selection.final.fit, trends))

@@ -9,6 +9,7 @@ that no periodic motion tells. At joints with such a spring the mean of q is not
 """
 
 import warnings as python_warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
 
@@ -20,6 +21,7 @@ from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.command import Command, actual, command_of
 from sea_ident.discrepancy.deviations import common_power, noise_power, spread_of_power
 from sea_ident.discrepancy.findings import Gap
+from sea_ident.effects import Effect
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.estimation import Model
@@ -95,6 +97,7 @@ def simulation_gap(
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None = None,
+    beside: Sequence[tuple[Effect, FloatArray]] = (),
 ) -> SimulationGap:
     """Simulate two models under the command of a recording, and compare both with it.
 
@@ -105,6 +108,8 @@ def simulation_gap(
         processed: the same, processed.
         controller: the controller of the robot; the velocity controller of `simulate` where None, if it is found to
             give the measured torque.
+        beside: effects with their values (k,) that act beside the repaired model: what changes in its course has
+            changed by so much in that recording.
 
     Returns:
         The gaps; none where a model cannot be simulated, with the reason in the notes.
@@ -114,8 +119,8 @@ def simulation_gap(
     notes = [command.note] if command.note else []
     parts = command.parts(processed)
     deviations = []
-    driven = [(model, part) for model in (before, after) for part in parts]
-    simulations = side_by_side(lambda one: simulated(one[0], command, one[1]), driven)
+    driven = [(model, part, acting) for model, acting in ((before, ()), (after, beside)) for part in parts]
+    simulations = side_by_side(lambda one: simulated(one[0], command, one[1], one[2]), driven)
     for label in ("before", "after"):
         try:
             runs = [next(simulations) for _ in parts]
@@ -168,7 +173,12 @@ def stride_of(processed: ProcessedRecording) -> int:
     return max(k for k in range(1, most + 1) if samples % k == 0)
 
 
-def simulated(model: Model, command: Command, processed: ProcessedRecording) -> dict[str, FloatArray]:
+def simulated(
+    model: Model,
+    command: Command,
+    processed: ProcessedRecording,
+    beside: Sequence[tuple[Effect, FloatArray]] = (),
+) -> dict[str, FloatArray]:
     """Samples (N', n) of one period of q, theta and tau as sensors without noise see them.
 
     After a lead from the measured state; at every so many samples of the recording (`stride_of`).
@@ -176,7 +186,7 @@ def simulated(model: Model, command: Command, processed: ProcessedRecording) -> 
     Raises:
         SeaIdentError: the model cannot be simulated, or its motion diverges.
     """
-    built = plant_from_identified(model)
+    built = plant_from_identified(model, beside)
     stride, period = stride_of(processed), command.reference.period
     samples = processed.samples // stride
     remembers = any(isinstance(planted.effect, MemoryEffect) for planted in built.effects)

@@ -1,10 +1,11 @@
 """The repaired model beside the model as it was, in forward simulation, and what to know before it is used."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.diagnosis import Diagnosis, units_by_joint
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
@@ -12,6 +13,7 @@ from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import SMALLEST_SHARE
 from sea_ident.discrepancy.repair import repaired_model
+from sea_ident.effects import Effect
 from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -37,7 +39,7 @@ class Repaired:
     notes: tuple[str, ...]
 
     def changing(self, trends: tuple[TrendTerm, ...]) -> "Repaired":
-        """The same with a model that holds what changes in the course of a recording; it was simulated in its mean."""
+        """The same with a model that holds what changes in the course of a recording; it was simulated as in a mean."""
         return self if self.model is None else replace(self, model=replace(self.model, trends=trends))
 
 
@@ -49,6 +51,7 @@ def repair(
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None,
+    beside: Sequence[tuple[Effect, FloatArray]] = (),
 ) -> Repaired:
     """Repair a model, and simulate it before and after.
 
@@ -60,6 +63,8 @@ def repair(
         recording: what was measured.
         processed: the same, processed.
         controller: what drove the motors.
+        beside: what has changed in the mean of the other motion since that of the recording: effects with their
+            values.
 
     Returns:
         The model with what it does.
@@ -68,11 +73,12 @@ def repair(
     repaired, *former = side_by_side(lambda one: repaired_model(model, *one), given)
     if isinstance(repaired, str):
         return Repaired(None, {}, (no_model(repaired),))
-    if not former:
+    if not former and not beside:
         return Repaired(repaired, {}, ())
-    if isinstance(former[0], str):
-        return Repaired(repaired, {}, (f"no forward simulation, as the model before the repair is none: {former[0]}",))
-    forward = _forward(former[0], repaired, held, recording, processed, controller)
+    as_it_was = former[0] if former else repaired
+    if isinstance(as_it_was, str):
+        return Repaired(repaired, {}, (f"no forward simulation, as the model before the repair is none: {as_it_was}",))
+    forward = _forward(as_it_was, repaired, held, recording, processed, controller, beside)
     return Repaired(repaired, forward.gaps, forward.notes)
 
 
@@ -88,10 +94,11 @@ def _forward(
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None,
+    beside: Sequence[tuple[Effect, FloatArray]],
 ) -> SimulationGap:
     """Forward simulation before and after, on another motion where there is one."""
     if held is not None and held.processed is not None and held.recording is not None:
-        return simulation_gap(before, after, held.recording, held.processed, controller)
+        return simulation_gap(before, after, held.recording, held.processed, controller, beside)
     found = simulation_gap(before, after, recording, processed, controller)
     same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
     return replace(found, notes=(*same, *found.notes))

@@ -78,6 +78,12 @@ def changes(data: PeriodData, effect: TrendEffect, temperature: FloatArray | Non
     return effect.change(time, own).reshape(data.periods, data.samples)
 
 
+def mean_course(data: PeriodData, effect: TrendEffect, temperature: FloatArray | None) -> FloatArray:
+    """(N,) change of a trend in the mean period, which closes: towards its end it leads over into those before."""
+    weights = closing_weights(data.places or range(data.periods), data.samples)
+    return np.asarray(np.einsum("tp,pt->t", weights, changes(data, effect, temperature)), dtype=np.float64)
+
+
 def of_joint(data: PeriodData, effect: TrendEffect, temperature: FloatArray | None) -> FloatArray | None:
     """(P,) temperature of the joint of a trend [degC], None where it was not measured or does not matter."""
     if temperature is None or effect.joint is None:

@@ -180,6 +180,14 @@ def does_not_drift(effect: str, joint: str | None) -> str:
     )
 
 
+def did_not_begin_anew(titles: Sequence[str], source: str) -> str:
+    """That what drifts by time does not do so in another recording as it would had it begun there."""
+    return (
+        f"{' and '.join(titles)}: {source} did not begin where the recording did. What drifts by time is taken there "
+        "as in the mean of the recording, and may be what is left of it. Begin both from the same state, as from cold"
+    )
+
+
 def on_the_centre(joint: str) -> str:
     """That how large a push is was told as if on the centre of mass."""
     return (

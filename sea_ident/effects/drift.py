@@ -9,7 +9,9 @@ import numpy as np
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import SimulationState
 from sea_ident.effects.base import Effect, JointEffect, Shape
+from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.state import Contribution, State
+from sea_ident.effects.viscous_friction import ViscousFriction
 
 _MINUTE = 60.0
 
@@ -52,10 +54,26 @@ class TrendEffect(Effect):
         What a model has in the mean of a recording is that of such a moment.
         """
 
+    def throughout(self, values: FloatArray, change: float) -> tuple[tuple[Effect, FloatArray], ...]:
+        """Effects with their values (k,) that do what this one does where it has changed by so much, and stays so.
+
+        For a simulation of one period in the place of the mean of many. By default there are none that do.
+
+        Args:
+            values: (k,) of its own columns.
+            change: how much it has changed.
+        """
+        return ()
+
     @property
     def moment(self) -> str:
         """Where it is none, and how it goes on, for people."""
         return "in the mean of a recording"
+
+
+def friction_throughout(joint: str, smoothing: float, values: FloatArray) -> tuple[tuple[Effect, FloatArray], ...]:
+    """The viscous and Coulomb friction of a motor, of two values."""
+    return (ViscousFriction(joint), values[:1]), (CoulombFriction(joint, smoothing), values[1:])
 
 
 def warming(time: FloatArray, time_constant: float) -> FloatArray:

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.effects.base import Anchor, Column, Shape, smooth_sign
-from sea_ident.effects.drift import DriftEffect
+from sea_ident.effects.base import Anchor, Column, Effect, Shape, smooth_sign
+from sea_ident.effects.drift import DriftEffect, friction_throughout
 from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
@@ -42,6 +42,10 @@ class FrictionDrift(DriftEffect):
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Theta' and its sign."""
         return np.stack([dtheta, smooth_sign(dtheta, self.smoothing)], axis=1)
+
+    def throughout(self, values: FloatArray, change: float) -> tuple[tuple[Effect, FloatArray], ...]:
+        """So much more friction."""
+        return friction_throughout(self.required_joint, self.smoothing, change * values)
 
     def anchored(self, anchor: Anchor) -> "FrictionDrift":
         """With the smoothing of the model's Coulomb friction."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 from sea_ident._typing import FloatArray
 from sea_ident.effects.base import Column, Effect, Shape
 from sea_ident.effects.drift import DriftEffect
+from sea_ident.effects.spring_stiffness import SpringStiffness
 from sea_ident.effects.state import Side
 from sea_ident.robot import Robot
 
@@ -41,3 +42,7 @@ class StiffnessDrift(DriftEffect):
     def local_columns(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Theta - q."""
         return (theta - q)[:, None]
+
+    def throughout(self, values: FloatArray, change: float) -> tuple[tuple[Effect, FloatArray], ...]:
+        """A spring that is so much stiffer."""
+        return ((SpringStiffness(self.required_joint), change * values),)

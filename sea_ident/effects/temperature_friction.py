@@ -8,8 +8,8 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import SimulationState
-from sea_ident.effects.base import Anchor, Column, JointEffect, smooth_sign
-from sea_ident.effects.drift import TrendEffect
+from sea_ident.effects.base import Anchor, Column, Effect, JointEffect, smooth_sign
+from sea_ident.effects.drift import TrendEffect, friction_throughout
 from sea_ident.effects.state import Contribution, Side, State
 from sea_ident.exceptions import EffectError
 from sea_ident.robot import Robot
@@ -85,6 +85,10 @@ class TemperatureFriction(JointEffect, TrendEffect):
     def about(self, change: float) -> "TemperatureFriction":
         """With that temperature as T_0, which it has in a simulation throughout."""
         return replace(self, reference=self.reference + change, rise=0.0)
+
+    def throughout(self, values: FloatArray, change: float) -> tuple[tuple[Effect, FloatArray], ...]:
+        """So much more friction."""
+        return friction_throughout(self.required_joint, self.smoothing, change * values)
 
     def anchored(self, anchor: Anchor) -> "TemperatureFriction":
         """With the smoothing of the model's Coulomb friction."""

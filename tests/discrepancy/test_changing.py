@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.changing import Changing
+from sea_ident.discrepancy.changing import Changing, followed
 from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.search import Selection
@@ -46,28 +46,55 @@ def gap(held):
 def test_friction_of_another_temperature_is_predicted_on_data_that_were_held_out(warmed):
     recordings, benches, selection, held = warmed
     changing = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data)
-    here, there = (np.mean(r.channel("temperature", ["knee"])) for r in recordings)
-    assert here - there > 3.0
+    here, there_warm = (np.mean(r.channel("temperature", ["knee"])) for r in recordings)
+    assert here - there_warm > 3.0
     alone = gap(held)
-    assert alone.after["knee"] == pytest.approx(PER_KELVIN * (here - there), rel=0.15)
+    assert alone.after["knee"] == pytest.approx(PER_KELVIN * (here - there_warm), rel=0.15)
     trends = trend(replace(WARM, smoothing=0.01), 0.0, PER_KELVIN)
-    followed = gap(changing.followed(benches[0], selection.final.fit, trends, held))
-    assert followed.before == alone.before
-    assert followed.after["knee"] < 0.15 * alone.after["knee"]
+    there = changing.elsewhere(benches[0], selection.final.fit, trends, held)
+    known = gap(followed(held, there.changed))
+    assert known.before == alone.before
+    assert known.after["knee"] < 0.15 * alone.after["knee"]
+    # as much less friction in all of a simulation
+    (viscous, none), (coulomb, amount) = there.throughout
+    assert [e.name for e in (viscous, coulomb)] == ["viscous_friction", "coulomb_friction"]
+    assert coulomb in selection.final.fit.effects
+    assert (none[0], amount[0]) == (0.0, pytest.approx(-PER_KELVIN * (here - there_warm), rel=0.02))
+    assert there.notes == ()
     assert set(changing.gaps(benches[0], selection.final.fit, trends, held)) == {"training", "holdout"}
 
 
-def test_without_its_temperature_there_and_by_time_nothing_is_predicted(warmed):
+def test_without_its_temperature_there_nothing_is_predicted(warmed):
     recordings, benches, selection, held = warmed
-    changing = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data)
+    changing, fit = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data), selection.final.fit
     trends = trend(WARM, 0.0, PER_KELVIN)
     columns = {name: values for name, values in recordings[1].columns.items() if name != "temperature_knee"}
     cold = replace(held, recording=Recording(time=recordings[1].time, columns=columns, source="other"))
-    assert gap(changing.followed(benches[0], selection.final.fit, trends, cold)).after == gap(held).after
-    assert set(changing.gaps(benches[0], selection.final.fit, trends, cold)) == {"training"}
-    by_time = trend(make_effect("friction_drift", "knee"), 0.0, 1.0)
-    assert gap(changing.followed(benches[0], selection.final.fit, by_time, held)).after == gap(held).after
-    assert changing.followed(benches[0], selection.final.fit, trends, None) is None
+    there = changing.elsewhere(benches[0], fit, trends, cold)
+    assert (there.changed, there.throughout, there.notes) == ((), (), ())
+    assert followed(cold, there.changed) is cold
+    assert set(changing.gaps(benches[0], fit, trends, cold)) == {"training"}
+    nothing = changing.elsewhere(benches[0], fit, trends, None)
+    assert nothing.changed == ()
+    assert followed(None, nothing.changed) is None
+
+
+def test_what_drifts_by_time_is_predicted_where_the_other_recording_began_as_this_one(warmed):
+    """The knee warms up anew in both: as friction that grows by time, it is 2.3 N m/min less soon after the begin."""
+    recordings, benches, selection, held = warmed
+    changing, fit = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data), selection.final.fit
+    drift = make_effect("friction_drift", "knee", time_constant=WARM.time_constant)
+    rate = PER_KELVIN * WARM.rise / WARM.time_constant * 60.0
+    alone = gap(held)
+    anew = changing.elsewhere(benches[0], fit, trend(drift, 0.0, rate), held)
+    assert [one.term.effect.name for one in anew.changed] == ["friction_drift"]
+    assert gap(followed(held, anew.changed)).after["knee"] < 0.15 * alone.after["knee"]
+    assert anew.notes == ()
+    # had it gone the other way it would have begun elsewhere
+    other = changing.elsewhere(benches[0], fit, trend(drift, 0.0, -rate), held)
+    assert (other.changed, other.throughout) == ((), ())
+    (text,) = other.notes
+    assert text.startswith("friction_drift at knee: other did not begin where the recording did")
 
 
 def test_what_a_model_holds_is_looked_for_first(warmed):

@@ -142,6 +142,16 @@ def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, drifted):
             assert abs(mean.value + change * term.values[1] - true - 3.0 * warming(time, 60.0)) < 3.0 * std
 
 
+def test_another_motion_that_began_as_this_one_is_predicted_and_simulated_in_its_own_mean(drifted):
+    """It is shorter: not all that the mean of the recording has of what drifts is there."""
+    _, _, found = drifted
+    assert found.holdout.shrink > 0.8
+    there = found.simulation_gap["q"]
+    assert there.before["knee"] > 3e-4
+    assert there.after["knee"] < 0.3 * there.before["knee"]
+    assert not any("did not begin" in text for text in found.warnings)
+
+
 @pytest.mark.scenario
 def test_a_small_drift_is_named_and_is_no_part_of_the_mean(leg, series):
     drift = planted("friction_drift", "knee", [0.3, 0.5], time_constant=60.0)

@@ -9,6 +9,7 @@ from sea_ident import load_robot
 from sea_ident.base_parameters import random_motion
 from sea_ident.effects import State, effect_from_dict, make_effect
 from sea_ident.effects.drift import TrendEffect, warming
+from sea_ident.effects.load import Term
 
 TIME = np.linspace(0.0, 300.0, 7)
 IN_TIME = ("friction_drift", "stiffness_drift", "torque_constant_drift")
@@ -64,3 +65,32 @@ def test_its_columns_are_those_of_a_change_of_one_times_the_change(name):
     assert np.any(one.motor)
     np.testing.assert_allclose(whole.motor, one.motor * change, rtol=1e-12)
     np.testing.assert_allclose(whole.link, one.link * change, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("friction_drift", (0.2, 0.5)), ("stiffness_drift", (30.0,)), ("temperature_friction", (0.02, 0.05))],
+)
+def test_what_has_changed_throughout_is_more_of_what_was_there(name, values):
+    leg = load_robot("exo_leg")
+    drift, values = make_effect(name, "knee"), np.array(values)
+    state = State(leg, random_motion(leg, 7, 2))
+    parts = [(effect.evaluate(state), own) for effect, own in drift.throughout(values, -1.5)]
+    whole = drift.steady(state)
+    assert np.any(whole.motor)
+    for side in ("link", "motor"):
+        there = sum(getattr(part, side) @ own for part, own in parts)
+        np.testing.assert_allclose(there, -1.5 * getattr(whole, side) @ values, rtol=1e-12)
+
+
+def test_a_torque_constant_that_has_changed_shows_more_of_all_that_its_motor_gives():
+    """U = T / (1 - v c), with the friction of the motor and what else acts there."""
+    leg = load_robot("exo_leg")
+    ripple = Term(make_effect("torque_ripple", "knee", order=5.0), (0.3, 0.4))
+    drift = make_effect("torque_constant_drift", "knee", viscous=0.3, coulomb=0.7, terms=(ripple,))
+    state = State(leg, random_motion(leg, 7, 2))
+    parts = [(effect.evaluate(state), own) for effect, own in drift.throughout(np.array([0.1]), 2.0)]
+    more = sum(part.motor @ own for part, own in parts)[:, leg.index("knee")]
+    given = drift.motor_torque(state)
+    np.testing.assert_allclose(given + more, given / (1.0 - 0.1 * 2.0), rtol=1e-12)
+    assert not any(np.any(part.link @ own) for part, own in parts)
