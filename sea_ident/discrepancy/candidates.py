@@ -280,7 +280,8 @@ def _promising(bench: Bench, model: _Model, effect: Effect) -> _Promising | None
     if count > 1 and not _bounded(bench, anchored):
         # a wave that is much longer than the path bends like what is there already, and is as large as you like
         own = np.einsum("hevk,vk->hev", spectra, values)
-        sizes = np.sqrt(np.sum(np.abs(own) ** 2, axis=0)) / np.maximum(bench.torque_rms[touched, None], 1e-300)
+        usual = np.maximum(bench.torque_rms, bench.described_rms)[touched, None]
+        sizes = np.sqrt(np.sum(np.abs(own) ** 2, axis=0)) / np.maximum(usual, 1e-300)
         modest = np.max(sizes, axis=0, initial=0.0) <= LARGEST_OF_MANY
         if np.any(allowed & modest):
             gains = np.where(modest, gains, -1.0)

@@ -136,3 +136,14 @@ def test_of_shapes_that_do_the_same_the_smallest_is_taken_whatever_rounding_says
     # more is more, whatever it takes
     assert list(_best_last(gains * [1.0, 1.0 + 1e-6, 1.0, 1.0], sizes, EXACTLY)) == [3, 0, 2, 1]
     assert list(_best_last(-np.ones(2), np.array([1.0, 2.0]), EXACTLY)) == [1, 0]
+
+
+def test_a_wave_may_be_as_large_as_what_the_bodies_weigh(small_motions):
+    """A ripple that cancels the weight leaves its motor a torque in which it is no modest part."""
+    bench = small_motions.bench(
+        small_motions.record([("torque_ripple", "knee", [2.0, 1.0], {"order": 12.0})], periods=10)
+    )
+    now = settle(bench, bench.effects)
+    effects = [make_effect(name, "knee") for name in ("torque_ripple", "torque_offset")]
+    gains = {found.effect.name: found.gain for found in scan(bench, now.fit, now.noise, effects)}
+    assert gains["torque_ripple"] > 0.97 * gains["torque_offset"]
