@@ -125,11 +125,18 @@ class LinkFlexibility(SignalEffect):
         """Q where the encoder sits, between the two compliances.
 
         Raises:
-            EffectError: if the signals do not hold the spring torque.
+            EffectError: if the signals do not hold the spring torque, or more bends behind the encoder than in all.
         """
         i = self.required_index(robot)
         if "tau_spring" not in signals:
             raise EffectError(f"the effect {self.name!r} needs the spring torque of the simulation, tau_spring")
+        whole = robot.spring(str(self.joint)).stiffness if self.stiffness is None else None
+        if whole is not None and self.compliance * whole >= 1.0:
+            unit = self.shape_unit(self.amounts[0], robot)
+            raise EffectError(
+                f"{self.title}: a compliance of {self.compliance:g} {unit} behind the encoder is more than the "
+                f"{1.0 / whole:.3g} {unit} of all that gives between motor and link; give less, or a softer spring"
+            )
         out = dict(signals)
         out["q"] = signals["q"].copy()
         out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]

@@ -78,7 +78,7 @@ def cases() -> Iterator[Case]:
         yield Case("joint-zero", "joint_offset", joint, shape={"offset": offset})
     for angles in ((0.0, 0.1), (0.1, 0.1), (0.15, 0.0), (0.25, -0.1), (0.05, 0.02)):
         yield Case("lean", "base_tilt", None, angles)
-    for compliance in (5e-4, 1e-3, 2e-3):
+    for compliance in (2.5e-4, 5e-4, 1e-3):
         yield Case("soft-link", "link_flexibility", "hip", shape={"compliance": compliance})
     for joint, value in (("knee", 0.3), ("ankle", -0.4)):
         yield Case("torque-constant", "torque_constant", joint, (value,))

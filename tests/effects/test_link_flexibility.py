@@ -8,6 +8,7 @@ import pytest
 import sea_ident
 from sea_ident.effects import Anchor, make_effect
 from sea_ident.effects.signal import below, rate_of
+from sea_ident.exceptions import EffectError
 from sea_ident.motion import FourierSeries
 
 COMPLIANCE = 0.0015
@@ -132,3 +133,15 @@ def test_a_few_states_of_a_motion_are_enough_for_positions_and_velocities(sample
     if samples < 16:
         np.testing.assert_allclose(few.q, whole.q[:samples], atol=1e-9)
         np.testing.assert_allclose(few.dq, whole.dq[:samples], atol=1e-9)
+
+
+def test_no_more_bends_behind_the_encoder_than_in_all():
+    leg, motion, torque, _ = bending()
+    signals = {"q": motion.q, "tau_spring": np.stack([torque, *np.zeros((2, len(torque)))], axis=1)}
+    whole = 1.0 / leg.spring("hip").stiffness
+    make_effect("link_flexibility", "hip", compliance=0.99 * whole).measured(leg, motion.time, signals)
+    said = r"link_flexibility at hip: a compliance of 0\.00168 rad/\(N m\) .* more than the 0\.00167 rad/\(N m\) of all"
+    with pytest.raises(EffectError, match=said):
+        make_effect("link_flexibility", "hip", compliance=0.00168).measured(leg, motion.time, signals)
+    # of a spring that was fitted nothing is said here
+    make_effect("link_flexibility", "hip", compliance=0.00168, **LAW).measured(leg, motion.time, signals)
