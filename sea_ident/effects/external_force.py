@@ -32,6 +32,10 @@ POINT = ("point_x", "point_y", "point_z")
 _REACH = 0.5
 """Distance from the centre of mass up to which a link is pushed, along every axis [m]."""
 
+RISE = 2.5e-3
+"""Time in which a push grows to its size in a simulation, and is gone, around its edges [s]: of a jump a step of the
+integrator would take all or nothing."""
+
 
 @dataclass(frozen=True)
 class ExternalForce(Effect):
@@ -115,11 +119,20 @@ class ExternalForce(Effect):
         force = np.asarray(values, dtype=np.float64)
 
         def act(state: SimulationState, link: FloatArray, motor: FloatArray) -> None:
-            if bool(self.pushes(np.array(state.time))):
+            share = self._share_around(state.time)
+            if share > 0.0:
                 x = robot.extended_state(state.q, state.theta)
-                link[:] -= robot.link_map.T @ (_jacobian(robot, data, body, x, self._point) @ force)
+                link[:] -= robot.link_map.T @ (_jacobian(robot, data, body, x, self._point) @ (share * force))
 
         return act
+
+    def _share_around(self, time: float) -> float:
+        """Share of the time `RISE` around a moment of a simulation in which it pushes [-]."""
+        window = time + RISE * np.array([-0.5, 0.5])
+        if not self.period > 0.0:  # what pushes once begins with the recording at the earliest
+            window = np.maximum(window, 0.0) if time >= 0.0 else np.minimum(window, 0.0)
+        before, after = self._pushed(window)
+        return float((after - before) / (window[1] - window[0]))
 
     def variants(self, state: State) -> tuple["ExternalForce", ...]:
         """Where the motion closes on itself, pushes in every period: begin and length in steps of a fraction of it."""

@@ -6,7 +6,8 @@ import pytest
 
 import sea_ident
 from sea_ident.effects import SimulationState, State, make_effect
-from sea_ident.motion import Motion
+from sea_ident.motion import FourierSeries, Motion
+from sea_ident.simulation import FrictionJitter, PlantedEffect, SensorNoise, simulate
 
 FORCE, STEP = np.array([3.0, -1.0, 2.0]), 1e-6
 
@@ -55,6 +56,28 @@ def test_it_pushes_for_as_long_as_it_does_between_samples_too(start, stop):
     if stop > start:
         assert np.sum(share * time) / np.sum(share) == pytest.approx(0.5 * (start + stop), abs=2e-3)
     np.testing.assert_allclose(make_effect("external_force", "knee").share_of(time), 1.0)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0.6486, 1.4043), (0.6511, 1.4012)])
+def test_a_simulation_hangs_on_no_step_that_an_edge_falls_into(start, stop):
+    """Off by a millisecond, an edge would move the links by 1e-4 rad and more."""
+    leg, series = sea_ident.load_robot("exo_leg"), FourierSeries(0.5, np.zeros(3), *np.full((2, 3, 1), 0.2))
+    push = PlantedEffect(make_effect("external_force", "knee", start=start, stop=stop, period=2.0), 5.0 * FORCE)
+    motions = [
+        simulate(
+            leg, series, periods=1, effects=[push], sensors=SensorNoise.none(), jitter=FrictionJitter.none(), step=step
+        ).motion
+        for step in (None, 2.5e-4)
+    ]
+    assert np.abs(motions[0].q - motions[1].q).max() < 1e-5
+
+
+def test_what_pushes_once_pushes_from_the_begin_of_a_recording_to_its_end():
+    effect = make_effect("external_force", "knee")
+    assert [effect._share_around(time) for time in (-1e-3, 0.0, 1e-3, 1.0)] == [0.0, 1.0, 1.0, 1.0]
+    late = make_effect("external_force", "knee", start=1.0, stop=2.0)
+    shares = [late._share_around(time) for time in (0.5, 1.0, 1.5, 2.0, 2.5)]
+    assert shares == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
 
 
 @pytest.mark.parametrize("count", [2, 7])
