@@ -90,6 +90,10 @@ def test_what_drifts_by_time_is_predicted_where_the_other_recording_began_as_thi
     assert [one.term.effect.name for one in anew.changed] == ["friction_drift"]
     assert gap(followed(held, anew.changed)).after["knee"] < 0.15 * alone.after["knee"]
     assert anew.notes == ()
+    # a mean period closes: what it ends with is what it begins with, though all goes on in every period
+    (course,) = (one.course for one in anew.changed)
+    a_period = np.ptp(drift.change(np.array([0.0, 5.0]), None))
+    assert abs(course[-1] - course[0]) < 0.01 * a_period
     # had it gone the other way it would have begun elsewhere
     other = changing.elsewhere(benches[0], fit, trend(drift, 0.0, -rate), held)
     assert (other.changed, other.throughout) == ((), ())
