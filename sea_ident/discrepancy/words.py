@@ -83,6 +83,8 @@ def paragraph(facts: Facts) -> str:
         drifting = {(t.effect.name, t.effect.joint) for t in facts.trend.trends}
         if all((m.effect, m.joint) in drifting for m in facts.added):
             parts.append("It shows in the comparison of the periods; the mean over all of them hides it.")
+            if facts.held is not None and facts.held.shrink > 0.0:
+                parts.append(_held_sentence(facts))
         else:
             parts.append(_gap_sentence(facts.gap, facts.units, [m.joint for m in facts.added if m.joint is not None]))
             if facts.held is not None:

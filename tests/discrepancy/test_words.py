@@ -12,7 +12,7 @@ from sea_ident.discrepancy.gap import gap_of
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.standing import Standing
-from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph, reservations
 from sea_ident.effects import make_effect
 
@@ -85,6 +85,19 @@ def test_motors_that_turn_too_fast_are_told_where_something_may_have_escaped():
         assert told not in paragraph(found)
         assert told in paragraph(replace(found, motors_too_fast=("hip", "knee")))
     assert told not in paragraph(replace(facts(Verdict.NAMED), motors_too_fast=("hip", "knee")))
+
+
+@pytest.mark.parametrize(("after", "said"), [(0.1, True), (0.5, False), (0.7, False)])
+def test_of_what_drifts_it_is_said_where_another_motion_shows_it(after, said):
+    """Where that did not begin as the recording did, nothing of it is predicted there."""
+    nothing = np.zeros(1)
+    drift = Trend(make_effect("friction_drift", "hip"), nothing, nothing, 100.0, 1e-9, torque_change=0.02)
+    missing = (MissingEffect("friction_drift", "hip", (), 0.02, 1e-9, ()),)
+    held = Gap({"hip": 0.5}, {"hip": after}, {"hip": 0.1})
+    found = replace(facts(Verdict.NAMED, trends=(drift,)), missing=missing, held=held, kind=Kind.OTHER_MOTION)
+    told = paragraph(found)
+    assert "the mean over all of them hides it." in told
+    assert ("On the motion that was held out the gap shrinks by 80 %." in told) is said
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER])
