@@ -88,6 +88,11 @@ class Diagnosis:
         """Whether any of it is in the mean of the periods, and does not just change in the course of the recording."""
         return self.adds and any(not isinstance(m.detail, TrendEffect) for m in self.missing)
 
+    @property
+    def adds_to_held_out(self) -> bool:
+        """Whether any of it shows in the mean of held-out data, where what drifts is another than in the recording."""
+        return self.adds_to_mean or (self.adds and self.holdout is not None and self.holdout.shrink > 0.0)
+
     def summary(self) -> str:
         """The paragraph, and the tables behind it."""
         lines = [f"{self.verdict}: {self.text}"]

@@ -161,8 +161,10 @@ def test_what_drifts_has_a_gap_from_period_to_period_and_none_in_the_mean(diagno
     }
     term = TrendTerm(drift, (0.0, -0.2), (0.1, 0.01))
     model = replace(leg_model, trends=(term,))
-    drifts = replace(diagnosis, missing=(found,), trend_gap=gaps, model=model)
-    assert not drifts.adds_to_mean
+    same = {"hip": 0.0, "knee": 0.4}
+    unlike = Gap(same, same, {"hip": 0.1, "knee": 0.1})
+    drifts = replace(diagnosis, missing=(found,), trend_gap=gaps, model=model, holdout=unlike)
+    assert not drifts.adds_to_held_out
     text = words(page_of(drifts, tmp_path))
     assert "What is named changes in the course of the recording, and the mean of its periods hides it." in text
     assert "90 % of what changes from period to period explained" in text
@@ -176,6 +178,13 @@ def test_what_drifts_has_a_gap_from_period_to_period_and_none_in_the_mean(diagno
     assert told in drifts.summary()
     drifts.save(tmp_path / "found.json")
     assert read_diagnosis(tmp_path / "found.json").trend_gap["holdout"].shrink == pytest.approx(0.75)
+    # in the mean of a motion that was held out it is another
+    assert "of the gap closed on held-out data" not in text
+    elsewhere = replace(drifts, holdout=gaps["holdout"])
+    assert elsewhere.adds_to_held_out
+    there = words(page_of(elsewhere, tmp_path))
+    assert "75 % of the gap closed on held-out data" in there
+    assert "% of the gap closed on the recording" not in there
     # beside what is in the mean both are told
     both = replace(drifts, missing=(found, diagnosis.missing[0]))
     assert both.adds_to_mean

@@ -27,10 +27,12 @@ class GapSection(DiagnosisSection):
         """Bars of every gap that was measured, and waveforms."""
         groups = []
         for label, words in DATA.items():
-            gap = diagnosis.training if label == "training" else diagnosis.holdout
+            held = label == "holdout"
+            gap = diagnosis.holdout if held else diagnosis.training
             if gap is not None:
                 units = units_by_joint(diagnosis.units, gap.before)
-                closed = _closed(gap, diagnosis.adds) if diagnosis.adds_to_mean or not diagnosis.adds else IN_COURSE
+                shows = diagnosis.adds_to_held_out if held else diagnosis.adds_to_mean
+                closed = _closed(gap, diagnosis.adds) if shows or not diagnosis.adds else IN_COURSE
                 groups.append((_bars(gap, f"On {words}", units), closed))
         for label, gap in diagnosis.trend_gap.items():
             units = units_by_joint(diagnosis.units, gap.before)

@@ -40,13 +40,16 @@ class VerdictSection(DiagnosisSection):
         if diagnosis.verdict is Verdict.ONLY_AGAINST_REFERENCE:
             one, several = ("change against the reference", "changes against the reference")
         tiles = [(str(len(diagnosis.missing)), one if len(diagnosis.missing) == 1 else several)]
-        for label, gap in (("the recording", diagnosis.training), ("held-out data", diagnosis.holdout)):
-            if diagnosis.adds_to_mean and gap is not None and any(value > 0.0 for value in gap.before.values()):
+        for label, gap, shows in (
+            ("the recording", diagnosis.training, diagnosis.adds_to_mean),
+            ("held-out data", diagnosis.holdout, diagnosis.adds_to_held_out),
+        ):
+            if shows and gap is not None and any(value > 0.0 for value in gap.before.values()):
                 tiles.append((f"{100 * gap.shrink:.0f} %", f"of the gap closed on {label}"))
         if diagnosis.adds and "training" in diagnosis.trend_gap:
             shrink = diagnosis.trend_gap["training"].shrink
             tiles.append((f"{100 * shrink:.0f} %", "of what changes from period to period explained"))
-        if diagnosis.adds_to_mean and "q" in diagnosis.simulation_gap:
+        if diagnosis.adds_to_held_out and "q" in diagnosis.simulation_gap:
             shrink = diagnosis.simulation_gap["q"].shrink
             tiles.append((f"{100 * shrink:.0f} %", "of the gap closed in forward simulation of q"))
         equations = list(dict.fromkeys(name for parts in lack.per_joint.values() for name in parts))
