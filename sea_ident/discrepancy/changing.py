@@ -11,6 +11,7 @@ from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, spectrum
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.forward import Present
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import ComplexArray, stacked
@@ -24,6 +25,7 @@ from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
+from sea_ident.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +55,15 @@ class Elsewhere:
     changed: tuple[Changed, ...] = ()
     notes: tuple[str, ...] = ()
 
-    @property
-    def throughout(self) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Effects with their values that do the same in a simulation of its mean."""
-        return tuple(
-            steady
-            for one in self.changed
-            for steady in one.term.effect.throughout(np.array(one.term.values), float(np.mean(one.course)))
-        )
+    def present(self, robot: Robot) -> Present:
+        """The same for a simulation of its mean."""
+        effects: list[tuple[Effect, FloatArray]] = []
+        delivered = np.ones(robot.n)
+        for one in self.changed:
+            effect, values, change = one.term.effect, np.array(one.term.values), float(np.mean(one.course))
+            effects.extend(effect.throughout(values, change))
+            delivered *= effect.delivered(robot, values, change)
+        return Present(tuple(effects), delivered)
 
 
 @dataclass(frozen=True, eq=False)

@@ -193,7 +193,7 @@ def _diagnosed(
     after = (as_identified, selection.final.fit)
     before = (processed, selection.start.fit) if selection.added else None
     there = changing.elsewhere(bench, selection.final.fit, trends, held)
-    repaired = repair(model, after, before, held, recording, processed, controller, there.throughout)
+    repaired = repair(model, after, before, held, recording, processed, controller, there.present(robot))
     spoken = (*_sticking(bench, selection), *_at_rest(selection, held), *_on_centres(bench, selection))
     of_springs = (
         *doubts_of_springs(robot, model.springs),

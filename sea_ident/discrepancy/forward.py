@@ -9,7 +9,6 @@ that no periodic motion tells. At joints with such a spring the mean of q is not
 """
 
 import warnings as python_warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
 
@@ -79,6 +78,42 @@ class SameDrive(Controller):
 
 
 @dataclass(frozen=True, eq=False)
+class Delivered(Controller):
+    """A controller of motors that give another torque than it is recorded.
+
+    Attributes:
+        like: the controller.
+        shares: (n,) of its torque that each motor gives [-].
+    """
+
+    like: Controller
+    shares: FloatArray
+
+    def drive(self, robot: Robot, reference: Reference, time: FloatArray) -> Drive:
+        """The drive at the times (N,) [s]."""
+        told, shares = self.like.drive(robot, reference, time), self.shares
+        return Drive(shares * told.bias, shares * told.position_gain, shares * told.velocity_gain, told.reference)
+
+
+@dataclass(frozen=True, eq=False)
+class Present:
+    """What has changed in the mean of a recording, for a model of the mean of another.
+
+    Attributes:
+        effects: that act beside the model, with their values (k,).
+        delivered: (n,) share of the recorded torque that each motor gives [-].
+    """
+
+    effects: tuple[tuple[Effect, FloatArray], ...]
+    delivered: FloatArray
+
+    @property
+    def differs(self) -> bool:
+        """Whether anything has."""
+        return bool(self.effects) or bool(np.any(self.delivered != 1.0))
+
+
+@dataclass(frozen=True, eq=False)
 class SimulationGap:
     """How far forward simulation is from a recording, before and after a repair.
 
@@ -97,7 +132,7 @@ def simulation_gap(
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None = None,
-    beside: Sequence[tuple[Effect, FloatArray]] = (),
+    present: Present | None = None,
 ) -> SimulationGap:
     """Simulate two models under the command of a recording, and compare both with it.
 
@@ -108,8 +143,7 @@ def simulation_gap(
         processed: the same, processed.
         controller: the controller of the robot; the velocity controller of `simulate` where None, if it is found to
             give the measured torque.
-        beside: effects with their values (k,) that act beside the repaired model: what changes in its course has
-            changed by so much in that recording.
+        present: what has changed in that recording, for the repaired model.
 
     Returns:
         The gaps; none where a model cannot be simulated, with the reason in the notes.
@@ -119,7 +153,7 @@ def simulation_gap(
     notes = [command.note] if command.note else []
     parts = command.parts(processed)
     deviations = []
-    driven = [(model, part, acting) for model, acting in ((before, ()), (after, beside)) for part in parts]
+    driven = [(model, part, own) for model, own in ((before, None), (after, present)) for part in parts]
     simulations = side_by_side(lambda one: simulated(one[0], command, one[1], one[2]), driven)
     for label in ("before", "after"):
         try:
@@ -177,7 +211,7 @@ def simulated(
     model: Model,
     command: Command,
     processed: ProcessedRecording,
-    beside: Sequence[tuple[Effect, FloatArray]] = (),
+    present: Present | None = None,
 ) -> dict[str, FloatArray]:
     """Samples (N', n) of one period of q, theta and tau as sensors without noise see them.
 
@@ -186,7 +220,8 @@ def simulated(
     Raises:
         SeaIdentError: the model cannot be simulated, or its motion diverges.
     """
-    built = plant_from_identified(model, beside)
+    present = present or Present((), np.ones(model.robot.n))
+    built = plant_from_identified(model, present.effects)
     stride, period = stride_of(processed), command.reference.period
     samples = processed.samples // stride
     remembers = any(isinstance(planted.effect, MemoryEffect) for planted in built.effects)
@@ -202,7 +237,7 @@ def simulated(
             periods=1,
             sensors=SensorNoise.none(),
             jitter=FrictionJitter.none(),
-            controller=command.driving(model, processed),
+            controller=Delivered(command.driving(model, processed), present.delivered),
             friction=built.friction,
             plant=plant,
             effects=built.effects,
@@ -215,4 +250,5 @@ def simulated(
     theta = q.copy()
     for i in robot.elastic_indices:
         theta[:, i] = recorded.columns[f"theta_{robot.joint_names[i]}"]
-    return {"q": q, "theta": theta, "tau": recorded.channel("tau_motor", robot.joint_names)}
+    tau = recorded.channel("tau_motor", robot.joint_names) / present.delivered
+    return {"q": q, "theta": theta, "tau": tau}

@@ -1,19 +1,17 @@
 """The repaired model beside the model as it was, in forward simulation, and what to know before it is used."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.diagnosis import Diagnosis, units_by_joint
 from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.forward import SimulationGap, simulation_gap
+from sea_ident.discrepancy.forward import Present, SimulationGap, simulation_gap
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import SMALLEST_SHARE
 from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.effects import Effect
 from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
@@ -51,7 +49,7 @@ def repair(
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None,
-    beside: Sequence[tuple[Effect, FloatArray]] = (),
+    present: Present | None = None,
 ) -> Repaired:
     """Repair a model, and simulate it before and after.
 
@@ -63,8 +61,7 @@ def repair(
         recording: what was measured.
         processed: the same, processed.
         controller: what drove the motors.
-        beside: what has changed in the mean of the other motion since that of the recording: effects with their
-            values.
+        present: what has changed in the mean of the other motion since that of the recording.
 
     Returns:
         The model with what it does.
@@ -73,12 +70,12 @@ def repair(
     repaired, *former = side_by_side(lambda one: repaired_model(model, *one), given)
     if isinstance(repaired, str):
         return Repaired(None, {}, (no_model(repaired),))
-    if not former and not beside:
+    if not former and not (present and present.differs):
         return Repaired(repaired, {}, ())
     as_it_was = former[0] if former else repaired
     if isinstance(as_it_was, str):
         return Repaired(repaired, {}, (f"no forward simulation, as the model before the repair is none: {as_it_was}",))
-    forward = _forward(as_it_was, repaired, held, recording, processed, controller, beside)
+    forward = _forward(as_it_was, repaired, held, recording, processed, controller, present)
     return Repaired(repaired, forward.gaps, forward.notes)
 
 
@@ -94,11 +91,11 @@ def _forward(
     recording: Recording | ProcessedRecording,
     processed: ProcessedRecording,
     controller: Controller | None,
-    beside: Sequence[tuple[Effect, FloatArray]],
+    present: Present | None,
 ) -> SimulationGap:
     """Forward simulation before and after, on another motion where there is one."""
     if held is not None and held.processed is not None and held.recording is not None:
-        return simulation_gap(before, after, held.recording, held.processed, controller, beside)
+        return simulation_gap(before, after, held.recording, held.processed, controller, present)
     found = simulation_gap(before, after, recording, processed, controller)
     same = ("no other motion was given: forward simulation is compared on the motion that was used in the fit",)
     return replace(found, notes=(*same, *found.notes))

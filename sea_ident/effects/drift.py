@@ -12,6 +12,7 @@ from sea_ident.effects.base import Effect, JointEffect, Shape
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.state import Contribution, State
 from sea_ident.effects.viscous_friction import ViscousFriction
+from sea_ident.robot import Robot
 
 _MINUTE = 60.0
 
@@ -64,6 +65,16 @@ class TrendEffect(Effect):
             change: how much it has changed.
         """
         return ()
+
+    def delivered(self, robot: Robot, values: FloatArray, change: float) -> FloatArray:
+        """(n,) share of the recorded torque that each motor gives where it has changed by so much [-]; by default all.
+
+        Args:
+            robot: the robot.
+            values: (k,) of its own columns.
+            change: how much it has changed.
+        """
+        return np.ones(robot.n)
 
     @property
     def moment(self) -> str:

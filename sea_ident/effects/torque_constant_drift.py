@@ -7,11 +7,10 @@ import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.effects.acting import Action, JointAction, SimulationState
-from sea_ident.effects.base import Column, Effect, Shape
-from sea_ident.effects.drift import DriftInTime, friction_throughout
+from sea_ident.effects.base import Column, Shape
+from sea_ident.effects.drift import DriftInTime
 from sea_ident.effects.load import LoadEffect
 from sea_ident.effects.state import Contribution, Side, State
-from sea_ident.effects.torque_constant import TorqueConstant
 from sea_ident.robot import Robot
 
 
@@ -56,15 +55,11 @@ class TorqueConstantDrift(LoadEffect, DriftInTime):
         """The measured torque drifts as the constant does: it is another share of what was measured before."""
         return np.asarray(values / (1.0 + values * change), dtype=np.float64)
 
-    def throughout(self, values: FloatArray, change: float) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Another torque constant, and all that acts at the motor by as much more as the record shows of it.
-
-        Of the torque u that the record shows, v c u is none: of what the motor gives it is 1 / (1 - v c).
-        """
-        more = 1.0 / (1.0 - change * values) - 1.0
-        own = np.array([self.viscous or 0.0, self.coulomb or 0.0])
-        beside = ((term.effect, more[0] * np.array(term.values)) for term in self._of(Side.MOTOR))
-        return (TorqueConstant(self.at), more), *friction_throughout(self.at, self.smoothing, more * own), *beside
+    def delivered(self, robot: Robot, values: FloatArray, change: float) -> FloatArray:
+        """Of the torque u that the record shows, v c u is none."""
+        shares = np.ones(robot.n)
+        shares[robot.index(self.at)] -= change * float(values[0])
+        return shares
 
     def torque(self, robot: Robot, values: FloatArray) -> Action:
         """The part of the commanded torque that is lost."""

@@ -56,7 +56,8 @@ def test_friction_of_another_temperature_is_predicted_on_data_that_were_held_out
     assert known.before == alone.before
     assert known.after["knee"] < 0.15 * alone.after["knee"]
     # as much less friction in all of a simulation
-    (viscous, none), (coulomb, amount) = there.throughout
+    present = there.present(held.bench.robot)
+    (viscous, none), (coulomb, amount) = present.effects
     assert [e.name for e in (viscous, coulomb)] == ["viscous_friction", "coulomb_friction"]
     assert coulomb in selection.final.fit.effects
     assert (none[0], amount[0]) == (0.0, pytest.approx(-PER_KELVIN * (here - there_warm), rel=0.02))
@@ -71,7 +72,8 @@ def test_without_its_temperature_there_nothing_is_predicted(warmed):
     columns = {name: values for name, values in recordings[1].columns.items() if name != "temperature_knee"}
     cold = replace(held, recording=Recording(time=recordings[1].time, columns=columns, source="other"))
     there = changing.elsewhere(benches[0], fit, trends, cold)
-    assert (there.changed, there.throughout, there.notes) == ((), (), ())
+    assert (there.changed, there.notes) == ((), ())
+    assert not there.present(held.bench.robot).differs
     assert followed(cold, there.changed) is cold
     assert set(changing.gaps(benches[0], fit, trends, cold)) == {"training"}
     nothing = changing.elsewhere(benches[0], fit, trends, None)
@@ -96,7 +98,7 @@ def test_what_drifts_by_time_is_predicted_where_the_other_recording_began_as_thi
     assert abs(course[-1] - course[0]) < 0.01 * a_period
     # had it gone the other way it would have begun elsewhere
     other = changing.elsewhere(benches[0], fit, trend(drift, 0.0, -rate), held)
-    assert (other.changed, other.throughout) == ((), ())
+    assert other.changed == ()
     (text,) = other.notes
     assert text.startswith("friction_drift at knee: other did not begin where the recording did")
 

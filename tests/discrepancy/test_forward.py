@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.command import command_of
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.forward import SameDrive, simulated, simulation_gap, stride_of
+from sea_ident.discrepancy.forward import Delivered, Present, SameDrive, simulated, simulation_gap, stride_of
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify
 from sea_ident.simulation import Controller, FrictionJitter, PlantedEffect, SensorNoise, VelocityController, simulate
@@ -18,7 +18,7 @@ PERIOD = 5.0
 pytestmark = pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 
 
-def exact(leg, series, planted, periods=2, rate=200.0):
+def exact(leg, series, planted, periods=2, rate=200.0, **options):
     return simulate(
         leg,
         series,
@@ -27,6 +27,7 @@ def exact(leg, series, planted, periods=2, rate=200.0):
         sensors=SensorNoise.none(),
         jitter=FrictionJitter.none(),
         rate=rate,
+        **options,
     ).recording
 
 
@@ -140,3 +141,21 @@ def test_a_drive_is_worked_out_once_for_the_same_robot_reference_and_times(leg, 
         drive = same.drive(leg, other, times)
         np.testing.assert_array_equal(drive.bias, VelocityController().drive(leg, other, times).bias)
     assert asked.asked == 3
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize("saturates", [False, True])
+def test_motors_that_give_less_than_is_recorded_are_simulated_so(leg, series, saturates):
+    """The record alone is of another size: what acts by the torque of the motor acts by what it gives."""
+    planted = [PlantedEffect(make_effect("torque_saturation", "knee"), np.array([5e-4]))] if saturates else []
+    effects = (*base_effects(leg), *(each.effect for each in planted))
+    model = identify(leg, exact(leg, series[0], planted), effects=effects, period=PERIOD)
+    shares = np.array([1.0, 0.95, 1.0])
+    controller = Delivered(VelocityController(), shares)
+    weak = exact(leg, series[1], planted, controller=controller)
+    columns = {**weak.columns, "current_knee": weak.columns["current_knee"] / shares[1]}
+    recording = replace(weak, columns=columns)
+    given = (model, model, recording, wide_processing(recording, leg, PERIOD))
+    gaps = simulation_gap(*given, VelocityController(), Present((), shares)).gaps
+    for kind in ("q", "tau"):
+        assert gaps[kind].after["knee"] < 0.15 * gaps[kind].before["knee"], kind

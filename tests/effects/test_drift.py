@@ -9,7 +9,6 @@ from sea_ident import load_robot
 from sea_ident.base_parameters import random_motion
 from sea_ident.effects import State, effect_from_dict, make_effect
 from sea_ident.effects.drift import TrendEffect, warming
-from sea_ident.effects.load import Term
 
 TIME = np.linspace(0.0, 300.0, 7)
 IN_TIME = ("friction_drift", "stiffness_drift", "torque_constant_drift")
@@ -83,14 +82,9 @@ def test_what_has_changed_throughout_is_more_of_what_was_there(name, values):
         np.testing.assert_allclose(there, -1.5 * getattr(whole, side) @ values, rtol=1e-12)
 
 
-def test_a_torque_constant_that_has_changed_shows_more_of_all_that_its_motor_gives():
-    """U = T / (1 - v c), with the friction of the motor and what else acts there."""
+def test_a_torque_constant_that_has_changed_gives_less_of_what_is_recorded():
     leg = load_robot("exo_leg")
-    ripple = Term(make_effect("torque_ripple", "knee", order=5.0), (0.3, 0.4))
-    drift = make_effect("torque_constant_drift", "knee", viscous=0.3, coulomb=0.7, terms=(ripple,))
-    state = State(leg, random_motion(leg, 7, 2))
-    parts = [(effect.evaluate(state), own) for effect, own in drift.throughout(np.array([0.1]), 2.0)]
-    more = sum(part.motor @ own for part, own in parts)[:, leg.index("knee")]
-    given = drift.motor_torque(state)
-    np.testing.assert_allclose(given + more, given / (1.0 - 0.1 * 2.0), rtol=1e-12)
-    assert not any(np.any(part.link @ own) for part, own in parts)
+    drift = make_effect("torque_constant_drift", "knee")
+    assert drift.throughout(np.array([0.1]), 2.0) == ()
+    np.testing.assert_allclose(drift.delivered(leg, np.array([0.1]), 2.0), [1.0, 0.8, 1.0])
+    np.testing.assert_array_equal(make_effect("stiffness_drift", "knee").delivered(leg, np.array([9.0]), 2.0), 1.0)
