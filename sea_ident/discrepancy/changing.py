@@ -26,6 +26,7 @@ from sea_ident.estimation import Model, TrendTerm
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
+from sea_ident.simulation import PlantedEffect
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +58,12 @@ class Elsewhere:
 
     def present(self, robot: Robot) -> Present:
         """The same for a simulation of its mean."""
-        effects: list[tuple[Effect, FloatArray]] = []
+        effects: list[PlantedEffect] = []
         delivered = np.ones(robot.n)
         for one in self.changed:
             effect, values, change = one.term.effect, np.array(one.term.values), float(np.mean(one.course))
-            effects.extend(effect.throughout(values, change))
-            delivered *= effect.delivered(robot, values, change)
+            effects.extend(PlantedEffect(*each) for each in effect.throughout(values, change))
+            delivered *= effect.delivered_share(robot, values, change)
         return Present(tuple(effects), delivered)
 
 

@@ -20,7 +20,6 @@ from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.command import Command, actual, command_of
 from sea_ident.discrepancy.deviations import common_power, noise_power, spread_of_power
 from sea_ident.discrepancy.findings import Gap
-from sea_ident.effects import Effect
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.estimation import Model
@@ -34,6 +33,7 @@ from sea_ident.simulation import (
     Controller,
     Drive,
     FrictionJitter,
+    PlantedEffect,
     SensorNoise,
     plant_from_identified,
     simulate,
@@ -78,12 +78,12 @@ class SameDrive(Controller):
 
 
 @dataclass(frozen=True, eq=False)
-class Delivered(Controller):
-    """A controller of motors that give another torque than it is recorded.
+class ScaledDrive(Controller):
+    """A controller of motors of which each gives a share of the torque that is recorded.
 
     Attributes:
         like: the controller.
-        shares: (n,) of its torque that each motor gives [-].
+        shares: (n,) [-].
     """
 
     like: Controller
@@ -100,17 +100,17 @@ class Present:
     """What has changed in the mean of a recording, for a model of the mean of another.
 
     Attributes:
-        effects: that act beside the model, with their values (k,).
-        delivered: (n,) share of the recorded torque that each motor gives [-].
+        effects: that act beside the model.
+        delivered_share: (n,) of the recorded torque, that each motor gives [-].
     """
 
-    effects: tuple[tuple[Effect, FloatArray], ...]
-    delivered: FloatArray
+    effects: tuple[PlantedEffect, ...]
+    delivered_share: FloatArray
 
     @property
     def differs(self) -> bool:
         """Whether anything has."""
-        return bool(self.effects) or bool(np.any(self.delivered != 1.0))
+        return bool(self.effects) or bool(np.any(self.delivered_share != 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +237,7 @@ def simulated(
             periods=1,
             sensors=SensorNoise.none(),
             jitter=FrictionJitter.none(),
-            controller=Delivered(command.driving(model, processed), present.delivered),
+            controller=ScaledDrive(command.driving(model, processed), present.delivered_share),
             friction=built.friction,
             plant=plant,
             effects=built.effects,
@@ -250,5 +250,5 @@ def simulated(
     theta = q.copy()
     for i in robot.elastic_indices:
         theta[:, i] = recorded.columns[f"theta_{robot.joint_names[i]}"]
-    tau = recorded.channel("tau_motor", robot.joint_names) / present.delivered
+    tau = recorded.channel("tau_motor", robot.joint_names) / present.delivered_share
     return {"q": q, "theta": theta, "tau": tau}

@@ -53,7 +53,7 @@ def within_periods(
         if not isinstance(trend.effect, TrendEffect):
             continue
         change = changes(data, trend.effect, temperature)
-        course = np.einsum("tp,pt->t", weights, change)
+        course = mean_course(data, trend.effect, temperature)
         values = trend.effect.referred(trend.values, -float(np.mean(change)))
         for p in range(data.periods):
             beyond = weights[:, p] * (change[p] - course.mean())

@@ -66,7 +66,7 @@ class TrendEffect(Effect):
         """
         return ()
 
-    def delivered(self, robot: Robot, values: FloatArray, change: float) -> FloatArray:
+    def delivered_share(self, robot: Robot, values: FloatArray, change: float) -> FloatArray:
         """(n,) share of the recorded torque that each motor gives where it has changed by so much [-]; by default all.
 
         Args:

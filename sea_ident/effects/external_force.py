@@ -96,6 +96,10 @@ class ExternalForce(Effect):
         begin, end = time - half, time + half
         if not self.period > 0.0:  # nothing is known of what was before and after
             begin, end = np.maximum(begin, time[0]), np.minimum(end, time[-1])
+        return self._share_between(begin, end)
+
+    def _share_between(self, begin: FloatArray, end: FloatArray) -> FloatArray:
+        """Share of the time from one moment to another (any shape) [s] in which it pushes [-]."""
         return np.asarray((self._pushed(end) - self._pushed(begin)) / (end - begin), dtype=np.float64)
 
     def _pushed(self, time: FloatArray) -> FloatArray:
@@ -128,11 +132,10 @@ class ExternalForce(Effect):
 
     def _share_around(self, time: float) -> float:
         """Share of the time `RISE` around a moment of a simulation in which it pushes [-]."""
-        window = time + RISE * np.array([-0.5, 0.5])
+        begin, end = time + RISE * np.array([-0.5, 0.5])
         if not self.period > 0.0:  # what pushes once begins with the recording at the earliest
-            window = np.maximum(window, 0.0) if time >= 0.0 else np.minimum(window, 0.0)
-        before, after = self._pushed(window)
-        return float((after - before) / (window[1] - window[0]))
+            begin, end = (max(begin, 0.0), end) if time >= 0.0 else (begin, min(end, 0.0))
+        return float(self._share_between(begin, end))
 
     def variants(self, state: State) -> tuple["ExternalForce", ...]:
         """Where the motion closes on itself, pushes in every period: begin and length in steps of a fraction of it."""

@@ -121,15 +121,12 @@ class LinkFlexibility(SignalEffect):
         """As it is: what bends behind an encoder is no error of it."""
         return motion
 
-    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Q where the encoder sits, between the two compliances.
+    def modified(self, robot: Robot, values: FloatArray) -> Robot:
+        """As it is: the spring of its description is the whole.
 
         Raises:
-            EffectError: if the signals do not hold the spring torque, or more bends behind the encoder than in all.
+            EffectError: if more would bend behind the encoder than in all.
         """
-        i = self.required_index(robot)
-        if "tau_spring" not in signals:
-            raise EffectError(f"the effect {self.name!r} needs the spring torque of the simulation, tau_spring")
         whole = robot.spring(str(self.joint)).stiffness if self.stiffness is None else None
         if whole is not None and self.compliance * whole >= 1.0:
             unit = self.shape_unit(self.amounts[0], robot)
@@ -137,6 +134,17 @@ class LinkFlexibility(SignalEffect):
                 f"{self.title}: a compliance of {self.compliance:g} {unit} behind the encoder is more than the "
                 f"{1.0 / whole:.3g} {unit} of all that gives between motor and link; give less, or a softer spring"
             )
+        return robot
+
+    def measured(self, robot: Robot, time: FloatArray, signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Q where the encoder sits, between the two compliances.
+
+        Raises:
+            EffectError: if the signals do not hold the spring torque.
+        """
+        i = self.required_index(robot)
+        if "tau_spring" not in signals:
+            raise EffectError(f"the effect {self.name!r} needs the spring torque of the simulation, tau_spring")
         out = dict(signals)
         out["q"] = signals["q"].copy()
         out["q"][:, i] += self.compliance * signals["tau_spring"][:, i]

@@ -55,7 +55,7 @@ class TorqueConstantDrift(LoadEffect, DriftInTime):
         """The measured torque drifts as the constant does: it is another share of what was measured before."""
         return np.asarray(values / (1.0 + values * change), dtype=np.float64)
 
-    def delivered(self, robot: Robot, values: FloatArray, change: float) -> FloatArray:
+    def delivered_share(self, robot: Robot, values: FloatArray, change: float) -> FloatArray:
         """Of the torque u that the record shows, v c u is none."""
         shares = np.ones(robot.n)
         shares[robot.index(self.at)] -= change * float(values[0])

@@ -37,14 +37,14 @@ class ModelPlant:
     effects: tuple[PlantedEffect, ...]
 
 
-def plant_from_identified(model: Model, beside: Sequence[tuple[Effect, FloatArray]] = ()) -> ModelPlant:
+def plant_from_identified(model: Model, beside: Sequence[PlantedEffect] = ()) -> ModelPlant:
     """The plant that behaves as an identified model says.
 
     What the data leave free of the bodies has the physically consistent values nearest to those of the description.
 
     Args:
         model: the model.
-        beside: effects that act beside those of the model, with the values (k,) of their columns.
+        beside: effects that act beside those of the model.
 
     Returns:
         The plant, its friction laws and the effects that act beside it, those in the springs included.
@@ -63,9 +63,12 @@ def plant_from_identified(model: Model, beside: Sequence[tuple[Effect, FloatArra
         for term in spring.terms:
             effects.append(term.effect)
             values.append(np.array(term.values))
-    for effect, own in (*((trend.effect, np.array(trend.values)) for trend in model.trends), *beside):
-        effects.append(effect)
-        values.append(own)
+    for trend in model.trends:
+        effects.append(trend.effect)
+        values.append(np.array(trend.values))
+    for planted in beside:
+        effects.append(planted.effect)
+        values.append(planted.values)
     return plant_from_model(robot, effects, np.concatenate(values))
 
 

@@ -57,10 +57,10 @@ def test_friction_of_another_temperature_is_predicted_on_data_that_were_held_out
     assert known.after["knee"] < 0.15 * alone.after["knee"]
     # as much less friction in all of a simulation
     present = there.present(held.bench.robot)
-    (viscous, none), (coulomb, amount) = present.effects
-    assert [e.name for e in (viscous, coulomb)] == ["viscous_friction", "coulomb_friction"]
-    assert coulomb in selection.final.fit.effects
-    assert (none[0], amount[0]) == (0.0, pytest.approx(-PER_KELVIN * (here - there_warm), rel=0.02))
+    viscous, coulomb = present.effects
+    assert [each.effect.name for each in present.effects] == ["viscous_friction", "coulomb_friction"]
+    assert coulomb.effect in selection.final.fit.effects
+    assert (viscous.values[0], coulomb.values[0]) == (0.0, pytest.approx(-PER_KELVIN * (here - there_warm), rel=0.02))
     assert there.notes == ()
     assert set(changing.gaps(benches[0], selection.final.fit, trends, held)) == {"training", "holdout"}
 

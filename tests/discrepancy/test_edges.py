@@ -82,6 +82,25 @@ def test_edges_are_known_to_a_small_part_of_a_sample(laboratory):
 
 
 @pytest.mark.scenario
+@pytest.mark.parametrize(("start", "stop"), [(0.6486, 1.4043), (2.1237, 2.9012)])
+def test_a_push_that_was_simulated_begins_and_ends_within_its_own_deviations(laboratory, start, stop):
+    """Whatever part of a sample, and of a step of the integrator, it begins and ends in."""
+    push = make_effect("external_force", "knee", start=start, stop=stop, period=PERIOD)
+    bench = laboratory.bench(laboratory.record([(push, [-1.1, 0.0, -6.4])], periods=12))
+    now, sample = settle(bench, bench.effects), PERIOD / bench.data.samples
+    effect = replace(push, start=start + 1.3 * sample, stop=stop - 0.7 * sample)
+    begun = bench.fit((*now.fit.effects, effect), now.noise, start=now.fit.parameters)
+    noise = bench.noise(begun)
+    found = with_sharp_edges(
+        bench, bench.fit(begun.effects, noise, start=begun.parameters), noise, len(now.fit.effects)
+    )
+    stds = edge_stds(bench, found, noise, len(now.fit.effects))
+    for name, true in (("start", start), ("stop", stop)):
+        assert stds[name] < 0.1 * sample
+        assert abs(getattr(found.effects[-1], name) - true) < 3.0 * stds[name], name
+
+
+@pytest.mark.scenario
 def test_edges_are_looked_for_beyond_the_next_windows(pushed, monkeypatch):
     """Where samples were left out near an edge there is a minimum on either side, and the worse may be in a window."""
     bench, now = pushed

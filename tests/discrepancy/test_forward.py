@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident.discrepancy.command import command_of
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.forward import Delivered, Present, SameDrive, simulated, simulation_gap, stride_of
+from sea_ident.discrepancy.forward import Present, SameDrive, ScaledDrive, simulated, simulation_gap, stride_of
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify
 from sea_ident.simulation import Controller, FrictionJitter, PlantedEffect, SensorNoise, VelocityController, simulate
@@ -151,11 +151,12 @@ def test_motors_that_give_less_than_is_recorded_are_simulated_so(leg, series, sa
     effects = (*base_effects(leg), *(each.effect for each in planted))
     model = identify(leg, exact(leg, series[0], planted), effects=effects, period=PERIOD)
     shares = np.array([1.0, 0.95, 1.0])
-    controller = Delivered(VelocityController(), shares)
+    controller = ScaledDrive(VelocityController(), shares)
     weak = exact(leg, series[1], planted, controller=controller)
     columns = {**weak.columns, "current_knee": weak.columns["current_knee"] / shares[1]}
     recording = replace(weak, columns=columns)
     given = (model, model, recording, wide_processing(recording, leg, PERIOD))
     gaps = simulation_gap(*given, VelocityController(), Present((), shares)).gaps
-    for kind in ("q", "theta"):
+    # beside a saturation a reversal falls on a sample, of whose current nobody knows which way the gear turned
+    for kind in ("q", "theta") if saturates else ("q", "theta", "tau"):
         assert gaps[kind].after["knee"] < 0.05 * gaps[kind].before["knee"], kind

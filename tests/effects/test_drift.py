@@ -86,5 +86,7 @@ def test_a_torque_constant_that_has_changed_gives_less_of_what_is_recorded():
     leg = load_robot("exo_leg")
     drift = make_effect("torque_constant_drift", "knee")
     assert drift.throughout(np.array([0.1]), 2.0) == ()
-    np.testing.assert_allclose(drift.delivered(leg, np.array([0.1]), 2.0), [1.0, 0.8, 1.0])
-    np.testing.assert_array_equal(make_effect("stiffness_drift", "knee").delivered(leg, np.array([9.0]), 2.0), 1.0)
+    np.testing.assert_allclose(drift.delivered_share(leg, np.array([0.1]), 2.0), [1.0, 0.8, 1.0])
+    np.testing.assert_array_equal(
+        make_effect("stiffness_drift", "knee").delivered_share(leg, np.array([9.0]), 2.0), 1.0
+    )

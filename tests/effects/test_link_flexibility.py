@@ -10,6 +10,7 @@ from sea_ident.effects import Anchor, make_effect
 from sea_ident.effects.signal import below, rate_of
 from sea_ident.exceptions import EffectError
 from sea_ident.motion import FourierSeries
+from sea_ident.simulation import PlantedEffect, simulate
 
 COMPLIANCE = 0.0015
 LAW = {"stiffness": 570.0, "cubic_stiffness": 15e3, "damping": 4.8}
@@ -136,12 +137,17 @@ def test_a_few_states_of_a_motion_are_enough_for_positions_and_velocities(sample
 
 
 def test_no_more_bends_behind_the_encoder_than_in_all():
-    leg, motion, torque, _ = bending()
-    signals = {"q": motion.q, "tau_spring": np.stack([torque, *np.zeros((2, len(torque)))], axis=1)}
+    """It is said before anything is simulated."""
+    leg, nothing = sea_ident.load_robot("exo_leg"), np.zeros(0)
     whole = 1.0 / leg.spring("hip").stiffness
-    make_effect("link_flexibility", "hip", compliance=0.99 * whole).measured(leg, motion.time, signals)
+    assert make_effect("link_flexibility", "hip", compliance=0.99 * whole).modified(leg, nothing) is leg
     said = r"link_flexibility at hip: a compliance of 0\.00168 rad/\(N m\) .* more than the 0\.00167 rad/\(N m\) of all"
+    too_soft = PlantedEffect(make_effect("link_flexibility", "hip", compliance=0.00168), nothing)
+    told = []
     with pytest.raises(EffectError, match=said):
-        make_effect("link_flexibility", "hip", compliance=0.00168).measured(leg, motion.time, signals)
+        simulate(
+            leg, FourierSeries(0.5, np.zeros(3), *np.full((2, 3, 1), 0.1)), effects=[too_soft], progress=told.append
+        )
+    assert told == []
     # of a spring that was fitted nothing is said here
-    make_effect("link_flexibility", "hip", compliance=0.00168, **LAW).measured(leg, motion.time, signals)
+    assert make_effect("link_flexibility", "hip", compliance=0.00168, **LAW).modified(leg, nothing) is leg
