@@ -168,8 +168,8 @@ def test_what_drifts_has_a_gap_from_period_to_period_and_none_in_the_mean(diagno
     text = words(page_of(drifts, tmp_path))
     assert "What is named changes in the course of the recording, and the mean of its periods hides it." in text
     assert "90 % of what changes from period to period explained" in text
-    assert "From period to period, on data that were held out, as if they began at the same time" in text
-    assert "75 % of the gap is closed." in text
+    assert "From period to period, on data that were held out" in text
+    assert "As if it began at the same time: 75 % of the gap is closed." in text
     assert term.summary(model.robot) in text
     assert "% of the gap closed on the recording" not in text
     told = (

@@ -10,6 +10,7 @@ from sea_ident.report.chart import Band, Chart, Line
 from sea_ident.report.section import DiagnosisSection
 
 DATA = {"training": "the recording that was diagnosed", "holdout": "data that were held out"}
+PERIODS_OF = {**DATA, "training": "the recording"}
 IN_COURSE = "What is named changes in the course of the recording, and the mean of its periods hides it."
 ROLES = ("before", "after", "noise")
 POSITIONS = ("q", "theta")
@@ -36,10 +37,10 @@ class GapSection(DiagnosisSection):
                 groups.append((_bars(gap, f"On {words}", units), closed))
         for label, gap in diagnosis.trend_gap.items():
             units = units_by_joint(diagnosis.units, gap.before)
+            title = f"From period to period, on {PERIODS_OF[label]}"
             # the time in another recording is not that in this one
-            began = "" if label == "training" else ", as if they began at the same time"
-            title = f"From period to period, on {DATA[label]}{began}"
-            groups.append((_bars(gap, title, units), _closed(gap, True)))
+            began = "" if label == "training" else "As if it began at the same time: "
+            groups.append((_bars(gap, title, units), began + _closed(gap, True)))
         for signal, gap in diagnosis.simulation_gap.items():
             units, scale = units_by_joint(diagnosis.units, gap.before, positions=signal in POSITIONS), 1.0
             if signal in POSITIONS:
