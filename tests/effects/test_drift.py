@@ -7,7 +7,7 @@ import pytest
 
 from sea_ident import load_robot
 from sea_ident.base_parameters import random_motion
-from sea_ident.effects import State, effect_from_dict, make_effect
+from sea_ident.effects import State, effect_classes, effect_from_dict, make_effect
 from sea_ident.effects.drift import TrendEffect, warming
 
 TIME = np.linspace(0.0, 300.0, 7)
@@ -90,3 +90,14 @@ def test_a_torque_constant_that_has_changed_gives_less_of_what_is_recorded():
     np.testing.assert_array_equal(
         make_effect("stiffness_drift", "knee").delivered_share(leg, np.array([9.0]), 2.0), 1.0
     )
+
+
+def test_every_drift_of_the_library_acts_in_a_simulation_of_one_mean():
+    """What acts in the columns alone would be predicted on another motion, and not simulated there."""
+    leg = load_robot("exo_leg")
+    drifts = [kind("knee") for kind in effect_classes().values() if issubclass(kind, TrendEffect)]
+    assert {drift.name for drift in drifts} >= {*IN_TIME, "temperature_friction"}
+    for drift in drifts:
+        values = np.full(len(drift.columns(leg)), 0.1)
+        acts = drift.throughout(values, 2.0) or np.any(drift.delivered_share(leg, values, 2.0) != 1.0)
+        assert acts, drift.name
