@@ -6,7 +6,6 @@ from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
     Detectability,
-    Gap,
     LackOfFit,
     Location,
     MissingEffect,
@@ -15,6 +14,7 @@ from sea_ident.discrepancy.findings import (
     Verdict,
     Waveforms,
 )
+from sea_ident.discrepancy.gap import Gap
 
 __all__ = [
     "Alternative",

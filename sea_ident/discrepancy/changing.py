@@ -9,9 +9,9 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy import check, words
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, spectrum
-from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import Present
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import ComplexArray, stacked

@@ -1,7 +1,7 @@
 """Checks at the border: recordings that prove nothing, clipped channels, spikes, pauses."""
 
 import warnings as python_warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.closing import mean_of_periods
 from sea_ident.discrepancy.data import EquationKind, PeriodData
-from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.odd_periods import odd_periods
 from sea_ident.effects import Effect
 from sea_ident.estimation import Model
@@ -55,30 +54,6 @@ class Findings:
     doubtful: bool = False
     limited: bool = False
     apart: bool = False
-
-
-def drowned(findings: Findings, gap: Gap, torque: Mapping[str, float], still: Collection[str] = ()) -> Findings:
-    """Findings with the joints whose noise is larger than their torque: of them, and with them, nothing can be told.
-
-    That happens where a joint hardly follows its motion, as one that friction holds: what its encoder then shows is
-    not what the model can be compared with, and every size is absorbed by noise.
-
-    Args:
-        findings: what was found before.
-        gap: of the recording.
-        torque: rms torque by joint [N m] or [N].
-        still: joints of which nothing is compared, for they stand; where all do, they count all the same.
-    """
-    compared = [name for name in gap.noise if name not in still] or list(gap.noise)
-    lost = [name for name in compared if not gap.noise[name] < torque[name]]
-    if not lost:
-        return findings
-    text = (
-        f"the noise of {', '.join(lost)} comes out larger than the torque there: does the joint follow its motion in "
-        "every period, or does friction hold it? Nothing can be told of this recording; move that joint faster and "
-        "farther, or leave it out (joints, on the command line --joints)"
-    )
-    return replace(findings, warnings=(*findings.warnings, text), fatal=True)
 
 
 def models_match(model: Model, reference: Model | None) -> None:

@@ -15,7 +15,6 @@ from sea_ident.discrepancy.data import waveform
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
-    Gap,
     LackOfFit,
     Location,
     MissingEffect,
@@ -23,7 +22,7 @@ from sea_ident.discrepancy.findings import (
     Waveforms,
 )
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import gap_of, noise_of_residual, torque_by_joint
+from sea_ident.discrepancy.gap import Gap, drowned, gap_of, noise_of_residual, torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut, Kind
 from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.locate import locate
@@ -116,7 +115,7 @@ def conclude(
     still = held_still(bench.data)
     holds = held is None or held_gap is None or goes_there(gap, held_gap, torque_by_joint(held.bench), still)
     sound = notes
-    notes = check.drowned(notes, gap, torque_by_joint(bench), still)
+    notes = drowned(notes, gap, torque_by_joint(bench), still)
     lost = notes is not sound
     if lost:
         remainder = 0.0

@@ -12,7 +12,6 @@ from sea_ident.arguments import as_path
 from sea_ident.discrepancy.findings import (
     Alternative,
     Detectability,
-    Gap,
     LackOfFit,
     Location,
     MissingEffect,
@@ -23,6 +22,7 @@ from sea_ident.discrepancy.findings import (
     Waveforms,
     chance,
 )
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.effects import effect_from_dict
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation import Model

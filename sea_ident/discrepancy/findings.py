@@ -1,13 +1,11 @@
 """The parts of a diagnosis."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from sea_ident._typing import FloatArray
 from sea_ident.atomic import atomic_file
@@ -228,78 +226,6 @@ class MissingEffect:
             # a term of the law of a spring may be cancelled by others of it
             return f"{plain(self.torque_share)} times the torque"
         return f"{plain(100 * self.torque_share)} % of torque"
-
-
-NOISE_FREE = 1e-6
-"""Share of a gap below which noise is none that a gap could be measured in [-]."""
-
-
-@dataclass(frozen=True)
-class Gap:
-    """Rms beyond the noise per joint [N m], [N] for a slide; of positions [rad] or [m].
-
-    Attributes:
-        before: of the model as it was, refitted.
-        after: of the model with the effects.
-        noise: rms of the noise of the mean.
-        units: unit of the torque of each joint; none where all are alike.
-    """
-
-    before: Mapping[str, float]
-    after: Mapping[str, float]
-    noise: Mapping[str, float]
-    units: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def shrink(self) -> float:
-        """1 - after / before over all joints, each in units of its noise where they differ; 0 where there was none."""
-        before, after = (float(np.linalg.norm(self._comparable(part))) for part in (self.before, self.after))
-        return 1.0 - after / before if before > 0.0 else 0.0
-
-    @property
-    def opens(self) -> bool:
-        """Whether there was no gap in any joint, and there is one now: no share says how much it grew."""
-        there = any(after > self.noise[joint] for joint, after in self.after.items())
-        return there and not any(value > 0.0 for value in self.before.values())
-
-    @property
-    def largest(self) -> str:
-        """The joint where the gap was largest, beside its noise where units differ."""
-        return self.largest_of(list(self.before))
-
-    def largest_of(self, joints: Sequence[str]) -> str:
-        """The same among some joints."""
-        sizes = dict(zip(self.before, self._comparable(self.before), strict=True))
-        return max(joints, key=lambda joint: float(sizes[joint]))
-
-    @property
-    def mixed(self) -> bool:
-        """Whether the units of joints differ."""
-        return len({self.units.get(joint) for joint in self.before}) > 1
-
-    def within_noise(self, times: float = 1.0) -> bool:
-        """Whether what is left over all joints is less than some times the noise, each as for `shrink`."""
-        left, noise = (float(np.linalg.norm(self._comparable(part))) for part in (self.after, self.noise))
-        return left < times * noise
-
-    def _comparable(self, sizes: Mapping[str, float]) -> FloatArray:
-        """(n,) sizes of one unit."""
-        if not self.mixed:
-            return np.array(list(sizes.values()))
-        # a recording without noise has gaps all the same
-        units = {j: max(self.noise[j], NOISE_FREE * max(self.before[j], self.after[j]), 1e-300) for j in sizes}
-        return np.array([size / units[joint] for joint, size in sizes.items()])
-
-    def summary(self, units: Mapping[str, str] | None = None) -> str:
-        """Before, after and noise per joint, with these units where they are not said elsewhere."""
-        parts = []
-        for joint, before in self.before.items():
-            after, noise = self.after[joint], self.noise[joint]
-            change = "within the noise" if before == after == 0.0 else f"{before:.3g} -> {after:.3g}"
-            unit = "" if units is None else f" {units[joint]}"
-            parts.append(f"{joint} {change} (noise {noise:.2g}{unit})")
-        shrink = f"; shrink {self.shrink:.2f}" if any(value > 0.0 for value in self.before.values()) else ""
-        return f"{', '.join(parts)}{shrink}"
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,15 @@ from math import ceil
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import words
 from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.command import Command, actual, command_of
 from sea_ident.discrepancy.deviations import common_power, noise_power, spread_of_power
-from sea_ident.discrepancy.findings import Gap
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.effects.memory import MemoryEffect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 from sea_ident.estimation import Model
 from sea_ident.estimation.unknown_zeros import unknown_zeros
-from sea_ident.exceptions import SeaIdentError, SeaIdentWarning
+from sea_ident.exceptions import DivergenceError, SeaIdentError, SeaIdentWarning
 from sea_ident.processing import ProcessedRecording
 from sea_ident.recordings import Recording
 from sea_ident.robot import Robot
@@ -159,7 +158,7 @@ def simulation_gap(
         try:
             runs = [next(simulations) for _ in parts]
         except SeaIdentError as error:
-            notes.append(words.not_simulated(label, error))
+            notes.append(_not_simulated(label, error))
             return SimulationGap({}, tuple(notes))
         deviations.append([deviations_of(run, part, len(parts) > 1) for run, part in zip(runs, parts, strict=True)])
     names = before.robot.joint_names
@@ -252,3 +251,17 @@ def simulated(
         theta[:, i] = recorded.columns[f"theta_{robot.joint_names[i]}"]
     tau = recorded.channel("tau_motor", robot.joint_names) / present.delivered_share
     return {"q": q, "theta": theta, "tau": tau}
+
+
+def _not_simulated(label: str, error: SeaIdentError) -> str:
+    """Why the model before or after the repair has no forward simulation, and what to do.
+
+    `simulate` advises on its own arguments, of which a diagnosis has but the controller.
+    """
+    why = str(error)
+    if isinstance(error, DivergenceError):
+        why = (
+            f"{error.what}; in Python, give `diagnose` the controller of the robot, or one with softer gains "
+            "(controller=). What was found does not rest on this simulation"
+        )
+    return f"no forward simulation of the model {label} the repair: {why}"

@@ -11,7 +11,7 @@ from sea_ident.discrepancy import check
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.data import PeriodData, away_from_reversals, period_data, wide_processing
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import gap_of, torque_by_joint
+from sea_ident.discrepancy.gap import drowned, gap_of, torque_by_joint
 from sea_ident.discrepancy.judge import EQUALLY_GOOD
 from sea_ident.discrepancy.noise import NoiseFloor, stacked
 from sea_ident.discrepancy.own_zeros import joints_with_own_zeros
@@ -154,7 +154,7 @@ def held_out(
     data = no_slower_than(not_compared_at(data, held_still(bench.data)), bench.data)
     found = tried(Bench(data, bench.effects), selection, processed.source)
     gap = gap_of(found.bench, found.before, found.after, found.noise)
-    lost = check.drowned(check.Findings(), gap, torque_by_joint(found.bench), held_still(data))
+    lost = drowned(check.Findings(), gap, torque_by_joint(found.bench), held_still(data))
     if lost.fatal:
         warnings.extend(f"held-out data: {text}" for text in lost.warnings)
         warnings.append(f"the held-out recording {processed.source} cannot be used; nothing was tested on it")

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident.discrepancy.diagnosis import Diagnosis, units_by_joint
-from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
 from sea_ident.discrepancy.forward import Present, SimulationGap, simulation_gap
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.discrepancy.heldout import HeldOut
 from sea_ident.discrepancy.judge import SMALLEST_SHARE
 from sea_ident.discrepancy.repair import repaired_model

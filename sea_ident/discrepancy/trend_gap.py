@@ -8,9 +8,8 @@ from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench import Bench
 from sea_ident.discrepancy.check import torque_units
 from sea_ident.discrepancy.data import spectrum
-from sea_ident.discrepancy.findings import Gap
 from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import per_joint
+from sea_ident.discrepancy.gap import Gap, per_joint
 from sea_ident.discrepancy.noise import ComplexArray, noise_directions
 from sea_ident.discrepancy.trend import Trend
 from sea_ident.discrepancy.trend_directions import steady_rows

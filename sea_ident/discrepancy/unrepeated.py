@@ -22,7 +22,6 @@ from sea_ident.discrepancy.conclude import without_sizes
 from sea_ident.discrepancy.diagnosis import Diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
-    Gap,
     LackOfFit,
     Location,
     MissingEffect,
@@ -30,6 +29,7 @@ from sea_ident.discrepancy.findings import (
     Verdict,
 )
 from sea_ident.discrepancy.fit import Fit
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.discrepancy.judge import SMALLEST_SHARE, at_a_bound, own_torque, significance, torque_change
 from sea_ident.discrepancy.lacking import candidate_effects
 from sea_ident.discrepancy.named import named_effect

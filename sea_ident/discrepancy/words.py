@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 from sea_ident.discrepancy.breakaway import Breakaway
 from sea_ident.discrepancy.data import PeriodData
-from sea_ident.discrepancy.findings import Gap, MissingEffect, Verdict, chance
+from sea_ident.discrepancy.findings import MissingEffect, Verdict, chance
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.lack import LACK_LEVEL
@@ -15,7 +16,6 @@ from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.trend import TrendTest
 from sea_ident.discrepancy.unnamed import Unnamed
 from sea_ident.effects.base import titled
-from sea_ident.exceptions import DivergenceError, SeaIdentError
 from sea_ident.robot import Robot
 
 FEW_PERIODS = 10
@@ -122,20 +122,6 @@ def slow_samples(data: PeriodData) -> str:
         f"{equation.joint}): there friction follows from a velocity that is hardly more than its noise, and what is "
         "named does not explain them. Let the joints pass zero velocity faster"
     )
-
-
-def not_simulated(label: str, error: SeaIdentError) -> str:
-    """Why the model before or after the repair has no forward simulation, and what to do.
-
-    `simulate` advises on its own arguments, of which a diagnosis has but the controller.
-    """
-    why = str(error)
-    if isinstance(error, DivergenceError):
-        why = (
-            f"{error.what}; in Python, give `diagnose` the controller of the robot, or one with softer gains "
-            "(controller=). What was found does not rest on this simulation"
-        )
-    return f"no forward simulation of the model {label} the repair: {why}"
 
 
 def fitted_zeros(robot: Robot, zeros: Mapping[str, float], held_out: Mapping[str, float]) -> list[str]:

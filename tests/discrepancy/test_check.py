@@ -7,34 +7,16 @@ import pytest
 
 from sea_ident import FourierSeries, simulate
 from sea_ident.discrepancy.check import (
-    Findings,
     as_identified,
     channels_move,
     clock_in_seconds,
-    drowned,
     wrong_columns,
 )
 from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.findings import Gap
 from sea_ident.effects import base_effects
 from sea_ident.exceptions import DiagnosisError, SeaIdentWarning
 from sea_ident.recordings import Recording
 from sea_ident.robot import load_robot
-
-
-def test_noise_beyond_the_torque_lets_nothing_be_told():
-    before = Findings(("clipped",))
-    sound = Gap({"hip": 0.1, "grip": 0.0}, {"hip": 0.0, "grip": 0.0}, {"hip": 0.05, "grip": 0.3})
-    assert drowned(before, sound, {"hip": 10.0, "grip": 4.0}) is before
-    for noise in (5e21, float("inf"), float("nan")):
-        lost = Gap(sound.before, sound.after, {"hip": 0.05, "grip": noise})
-        found = drowned(before, lost, {"hip": 10.0, "grip": 4.0})
-        assert found.fatal
-        assert found.warnings[0] == "clipped"
-        assert "the noise of grip" in found.warnings[1]
-        # of a joint that stands nothing is compared, and the others are told without it; where all do, none is
-        assert drowned(before, lost, {"hip": 10.0, "grip": 4.0}, ("grip",)) is before
-        assert drowned(before, lost, {"hip": 10.0, "grip": 4.0}, ("hip", "grip")) == found
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,8 @@ from sea_ident.discrepancy.conclude import (
 )
 from sea_ident.discrepancy.confirm import Confirmed
 from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
-from sea_ident.discrepancy.findings import Gap, LackOfFit, Location, MissingEffect
-from sea_ident.discrepancy.gap import torque_by_joint
+from sea_ident.discrepancy.findings import LackOfFit, Location, MissingEffect
+from sea_ident.discrepancy.gap import Gap, torque_by_joint
 from sea_ident.discrepancy.heldout import HeldOut, Kind
 from sea_ident.discrepancy.lack import remainder_share
 from sea_ident.discrepancy.locate import locate

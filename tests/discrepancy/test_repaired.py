@@ -9,7 +9,8 @@ import pytest
 
 from sea_ident.discrepancy import repaired
 from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import Gap, LackOfFit, Verdict
+from sea_ident.discrepancy.findings import LackOfFit, Verdict
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.discrepancy.repaired import Repaired, repair, with_repaired
 from sea_ident.estimation.agreement import Agreement
 from sea_ident.report.sections import gap as gap_section

@@ -11,7 +11,8 @@ import sea_ident
 from sea_ident.discrepancy import Verdict
 from sea_ident.discrepancy.check import Findings
 from sea_ident.discrepancy.conclude import explains, verdict_of
-from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, MissingParameter
+from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.discrepancy.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning

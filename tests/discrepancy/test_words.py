@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.diagnosis import _gap
-from sea_ident.discrepancy.findings import Alternative, Gap, MissingEffect, MissingParameter, Verdict, chance
-from sea_ident.discrepancy.gap import gap_of
+from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter, Verdict, chance
+from sea_ident.discrepancy.gap import Gap, gap_of
 from sea_ident.discrepancy.heldout import Kind
 from sea_ident.discrepancy.reference import ParameterChange
 from sea_ident.discrepancy.standing import Standing

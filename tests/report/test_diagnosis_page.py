@@ -12,7 +12,6 @@ from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
 from sea_ident.discrepancy.findings import (
     Alternative,
     Detectability,
-    Gap,
     LackOfFit,
     Location,
     MissingEffect,
@@ -22,6 +21,7 @@ from sea_ident.discrepancy.findings import (
     Verdict,
     Waveforms,
 )
+from sea_ident.discrepancy.gap import Gap
 from sea_ident.effects import make_effect
 from sea_ident.effects.friction_drift import FrictionDrift
 from sea_ident.estimation import TrendTerm
