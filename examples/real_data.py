@@ -33,7 +33,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from sea_ident import close_gap, diagnose, identify, load_robot, process, read_recording, validate
-from sea_ident.discrepancy.circular import circular_springs
+from sea_ident.discrepancy.measured.circular import circular_springs
 from sea_ident.effects import State, make_effect
 from sea_ident.estimation import identify_measured_springs
 from sea_ident.exceptions import SeaIdentError, SeaIdentWarning

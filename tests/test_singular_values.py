@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.linear import solve
+from sea_ident.discrepancy.bench.linear import solve
 from sea_ident.singular_values import svd
 
 

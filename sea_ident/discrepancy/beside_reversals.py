@@ -4,21 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.breakaway import LEVEL, breakaway_p
-from sea_ident.discrepancy.candidates import Candidate, scan
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.fit import Fit
+from sea_ident.discrepancy.bench.judge import EQUALLY_GOOD, SMALLEST_SHARE, too_short, torque_changes
+from sea_ident.discrepancy.bench.lack import LACK_LEVEL, lack_of_fit
+from sea_ident.discrepancy.bench.lacking import candidate_effects
+from sea_ident.discrepancy.bench.physics import physical
+from sea_ident.discrepancy.bench.settle import Settled, settle_again
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, unexplained
-from sea_ident.discrepancy.confirm import Confirmed
-from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.judge import EQUALLY_GOOD, SMALLEST_SHARE, too_short, torque_changes
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.lacking import candidate_effects
-from sea_ident.discrepancy.next_effect import BESIDE_ANOTHER, next_effect
-from sea_ident.discrepancy.physics import physical
-from sea_ident.discrepancy.refit import refitted
-from sea_ident.discrepancy.search import MOST_EFFECTS
-from sea_ident.discrepancy.settle import Settled, settle_again
-from sea_ident.discrepancy.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.discrepancy.measured.standing import LIVE_BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.discrepancy.search.breakaway import LEVEL, breakaway_p
+from sea_ident.discrepancy.search.candidates import Candidate, scan
+from sea_ident.discrepancy.search.confirm import Confirmed
+from sea_ident.discrepancy.search.next_effect import BESIDE_ANOTHER, next_effect
+from sea_ident.discrepancy.search.refit import refitted
+from sea_ident.discrepancy.search.search import MOST_EFFECTS
 from sea_ident.effects.coulomb_friction import CoulombFriction
 from sea_ident.effects.stribeck_friction import StribeckFriction
 

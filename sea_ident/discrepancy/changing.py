@@ -6,20 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import check, words
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import PeriodData, spectrum
-from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.forward import Present
-from sea_ident.discrepancy.gap import Gap
-from sea_ident.discrepancy.heldout import HeldOut
-from sea_ident.discrepancy.judge import EQUALLY_GOOD
-from sea_ident.discrepancy.noise import ComplexArray, stacked
-from sea_ident.discrepancy.trend import TrendTest, compare_periods
-from sea_ident.discrepancy.trend_directions import Name, steady_rows
-from sea_ident.discrepancy.trend_gap import trend_gap
-from sea_ident.discrepancy.trend_terms import trend_terms
-from sea_ident.discrepancy.trend_within import mean_course, of_joint, within_periods
+from sea_ident.discrepancy import words
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.fit import Fit
+from sea_ident.discrepancy.bench.gap import Gap
+from sea_ident.discrepancy.bench.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.compared.heldout import HeldOut
+from sea_ident.discrepancy.measured import check
+from sea_ident.discrepancy.measured.data import PeriodData, spectrum
+from sea_ident.discrepancy.measured.noise import ComplexArray, stacked
+from sea_ident.discrepancy.simulated.forward import Present
+from sea_ident.discrepancy.trends.trend import TrendTest, compare_periods
+from sea_ident.discrepancy.trends.trend_directions import Name, steady_rows
+from sea_ident.discrepancy.trends.trend_gap import trend_gap
+from sea_ident.discrepancy.trends.trend_terms import trend_terms
+from sea_ident.discrepancy.trends.trend_within import mean_course, of_joint, within_periods
 from sea_ident.effects import Effect
 from sea_ident.effects.drift import TrendEffect
 from sea_ident.estimation import Model, TrendTerm

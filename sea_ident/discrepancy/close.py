@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from sea_ident.arguments import expect
+from sea_ident.discrepancy.bench.gap import Gap
 from sea_ident.discrepancy.diagnose import diagnose
-from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import MissingEffect, Verdict
-from sea_ident.discrepancy.gap import Gap
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.findings import MissingEffect, Verdict
 from sea_ident.estimation import Model
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.one_thread import one_thread

@@ -6,14 +6,26 @@ from dataclasses import replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import assess, check, words
-from sea_ident.discrepancy.base_model import BASIC, FRICTION
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.confirm import Confirmed
-from sea_ident.discrepancy.contribution import contribution, torque_std
-from sea_ident.discrepancy.data import waveform
-from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import (
+from sea_ident.discrepancy import words
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.contribution import contribution, torque_std
+from sea_ident.discrepancy.bench.fit import Fit
+from sea_ident.discrepancy.bench.gap import Gap, drowned, gap_of, noise_of_residual, torque_by_joint
+from sea_ident.discrepancy.bench.lack import LACK_LEVEL, lack_of_fit, remainder_share
+from sea_ident.discrepancy.bench.settle import Settled
+from sea_ident.discrepancy.compared.heldout import HeldOut, Kind
+from sea_ident.discrepancy.compared.reference import ParameterChange
+from sea_ident.discrepancy.compared.transfer import TRANSFERS, TRANSFERS_ALONE
+from sea_ident.discrepancy.evidence import assess
+from sea_ident.discrepancy.evidence.locate import locate
+from sea_ident.discrepancy.evidence.named import named_effects, named_trend
+from sea_ident.discrepancy.measured import check
+from sea_ident.discrepancy.measured.data import waveform
+from sea_ident.discrepancy.measured.noise import NoiseFloor
+from sea_ident.discrepancy.measured.standing import held_still, longest_standing
+from sea_ident.discrepancy.nameless.unnamed import LEAVES, Unnamed
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.findings import (
     Alternative,
     LackOfFit,
     Location,
@@ -21,20 +33,10 @@ from sea_ident.discrepancy.findings import (
     Verdict,
     Waveforms,
 )
-from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import Gap, drowned, gap_of, noise_of_residual, torque_by_joint
-from sea_ident.discrepancy.heldout import HeldOut, Kind
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit, remainder_share
-from sea_ident.discrepancy.locate import locate
-from sea_ident.discrepancy.named import named_effects, named_trend
-from sea_ident.discrepancy.noise import NoiseFloor
-from sea_ident.discrepancy.reference import ParameterChange
-from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import Settled
-from sea_ident.discrepancy.standing import held_still, longest_standing
-from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
-from sea_ident.discrepancy.trend import TrendTest
-from sea_ident.discrepancy.unnamed import LEAVES, Unnamed
+from sea_ident.discrepancy.search.base_model import BASIC, FRICTION
+from sea_ident.discrepancy.search.confirm import Confirmed
+from sea_ident.discrepancy.search.search import Selection
+from sea_ident.discrepancy.trends.trend import TrendTest
 from sea_ident.effects.orders import motors_too_fast
 from sea_ident.effects.state import State
 

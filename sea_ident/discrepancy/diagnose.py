@@ -5,37 +5,39 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from sea_ident.arguments import expect, expect_number
-from sea_ident.discrepancy import assess, check, words
-from sea_ident.discrepancy.against import against
-from sea_ident.discrepancy.base_model import completed
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.breakaway import stiction
+from sea_ident.discrepancy import words
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.columns import Key, effect_key
+from sea_ident.discrepancy.bench.gap import torque_by_joint
+from sea_ident.discrepancy.bench.judge import FEWEST_TO_SEARCH
+from sea_ident.discrepancy.bench.lack import LACK_LEVEL, lack_of_fit
 from sea_ident.discrepancy.changing import Changing, followed
-from sea_ident.discrepancy.circular import circular_springs
-from sea_ident.discrepancy.columns import Key, effect_key
+from sea_ident.discrepancy.compared.against import against
+from sea_ident.discrepancy.compared.decide import Alternatives, decide, declared, simplest_first
+from sea_ident.discrepancy.compared.heldout import HeldOut, held_out
+from sea_ident.discrepancy.compared.resting import resting, with_constants_at_rest
 from sea_ident.discrepancy.conclude import FEWEST_PERIODS, beyond_the_library, conclude
-from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all
-from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.decide import Alternatives, decide, declared, simplest_first
-from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.drifting import drifting
-from sea_ident.discrepancy.edges import stays_on_the_centre
-from sea_ident.discrepancy.findings import Verdict
-from sea_ident.discrepancy.gap import torque_by_joint
-from sea_ident.discrepancy.heldout import HeldOut, held_out
-from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
-from sea_ident.discrepancy.lack import LACK_LEVEL, lack_of_fit
-from sea_ident.discrepancy.next_experiment import with_next_experiment
-from sea_ident.discrepancy.own_zeros import own_zeros
-from sea_ident.discrepancy.repaired import repair, with_repaired
-from sea_ident.discrepancy.resting import resting, with_constants_at_rest
-from sea_ident.discrepancy.same import not_the_same
-from sea_ident.discrepancy.search import Selection, search, without
+from sea_ident.discrepancy.evidence import assess
+from sea_ident.discrepancy.evidence.next_experiment import with_next_experiment
+from sea_ident.discrepancy.evidence.sensor_limits import limits
+from sea_ident.discrepancy.measured import check
+from sea_ident.discrepancy.measured.circular import circular_springs
+from sea_ident.discrepancy.measured.data import period_data, wide_processing
+from sea_ident.discrepancy.measured.own_zeros import own_zeros
+from sea_ident.discrepancy.measured.same import not_the_same
+from sea_ident.discrepancy.nameless.drifting import drifting
+from sea_ident.discrepancy.nameless.stand_ins import stand_ins
+from sea_ident.discrepancy.nameless.unnamed import Unnamed, unnamed
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.findings import Verdict
+from sea_ident.discrepancy.search.base_model import completed
+from sea_ident.discrepancy.search.breakaway import stiction
+from sea_ident.discrepancy.search.confirm import Confirmed, confirm, explains_nearly_all
+from sea_ident.discrepancy.search.edges import stays_on_the_centre
+from sea_ident.discrepancy.search.search import Selection, search, without
 from sea_ident.discrepancy.searching import Progress, compared, searched_with_possible_springs, unsearched
-from sea_ident.discrepancy.sensor_limits import limits
-from sea_ident.discrepancy.stand_ins import stand_ins
-from sea_ident.discrepancy.trend import TrendTest
-from sea_ident.discrepancy.unnamed import Unnamed, unnamed
+from sea_ident.discrepancy.simulated.repaired import repair, with_repaired
+from sea_ident.discrepancy.trends.trend import TrendTest
 from sea_ident.discrepancy.unrepeated import diagnose_pushed, diagnose_unrepeated, pushes_between_passes
 from sea_ident.effects import Effect, spring_effects
 from sea_ident.effects.motor_encoder_offset import MotorEncoderOffset

@@ -4,24 +4,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from sea_ident.discrepancy import words
-from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.lack import remainder_share
+from sea_ident.discrepancy.bench.settle import Settled, settle
 from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
-from sea_ident.discrepancy.candidates import scan
 from sea_ident.discrepancy.changing import Changing
 from sea_ident.discrepancy.conclude import unexplained
-from sea_ident.discrepancy.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
-from sea_ident.discrepancy.lack import remainder_share
-from sea_ident.discrepancy.possible_springs import (
+from sea_ident.discrepancy.evidence.sensor_limits import steps_cover
+from sea_ident.discrepancy.search.candidates import scan
+from sea_ident.discrepancy.search.confirm import Confirmed, confirm, explains_nearly_all, without_the_slow
+from sea_ident.discrepancy.search.possible_springs import (
     begun_with_zeros,
     impossible_springs,
     left_without_cubic,
     with_fitted_zeros,
     without_cubic,
 )
-from sea_ident.discrepancy.search import Selection, search, still_needed
-from sea_ident.discrepancy.sensor_limits import steps_cover
-from sea_ident.discrepancy.settle import Settled, settle
-from sea_ident.discrepancy.trend import TrendTest
+from sea_ident.discrepancy.search.search import Selection, search, still_needed
+from sea_ident.discrepancy.trends.trend import TrendTest
 from sea_ident.effects.offset import Offset
 
 Progress = Callable[[str, float], None]

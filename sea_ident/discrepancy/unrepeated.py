@@ -14,13 +14,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy import assess, circular, words
-from sea_ident.discrepancy.base_model import completed
-from sea_ident.discrepancy.candidates import Candidate, scan
-from sea_ident.discrepancy.check import torque_units
+from sea_ident.discrepancy import words
+from sea_ident.discrepancy.bench.fit import Fit
+from sea_ident.discrepancy.bench.gap import Gap
+from sea_ident.discrepancy.bench.judge import SMALLEST_SHARE, at_a_bound, own_torque, significance, torque_change
+from sea_ident.discrepancy.bench.lacking import candidate_effects
+from sea_ident.discrepancy.bench.physics import physical
+from sea_ident.discrepancy.bench.settle import Settled, settle, settle_again
+from sea_ident.discrepancy.bench.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
 from sea_ident.discrepancy.conclude import without_sizes
-from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import (
+from sea_ident.discrepancy.evidence import assess
+from sea_ident.discrepancy.evidence.named import named_effect
+from sea_ident.discrepancy.measured import circular
+from sea_ident.discrepancy.measured.check import torque_units
+from sea_ident.discrepancy.measured.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.findings import (
     Alternative,
     LackOfFit,
     Location,
@@ -28,18 +37,11 @@ from sea_ident.discrepancy.findings import (
     MissingParameter,
     Verdict,
 )
-from sea_ident.discrepancy.fit import Fit
-from sea_ident.discrepancy.gap import Gap
-from sea_ident.discrepancy.judge import SMALLEST_SHARE, at_a_bound, own_torque, significance, torque_change
-from sea_ident.discrepancy.lacking import candidate_effects
-from sea_ident.discrepancy.named import named_effect
-from sea_ident.discrepancy.next_effect import FAMILY_LEVEL
-from sea_ident.discrepancy.physics import physical
-from sea_ident.discrepancy.pushes import FEWEST_PASSES, Push, departure_p, find_pushes, pushed
-from sea_ident.discrepancy.repair import repaired_model
-from sea_ident.discrepancy.repaired import no_model
-from sea_ident.discrepancy.settle import Settled, settle, settle_again
-from sea_ident.discrepancy.stretch import BETTER, BLOCKS, StretchBench, block_errors, full_residual, stretch_data
+from sea_ident.discrepancy.result.repair import repaired_model
+from sea_ident.discrepancy.search.base_model import completed
+from sea_ident.discrepancy.search.candidates import Candidate, scan
+from sea_ident.discrepancy.search.next_effect import FAMILY_LEVEL
+from sea_ident.discrepancy.simulated.repaired import no_model
 from sea_ident.effects import Effect, make_effect, spring_effects
 from sea_ident.estimation import Model
 from sea_ident.estimation.scales import doubts_of_springs

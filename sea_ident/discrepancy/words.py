@@ -3,18 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sea_ident.discrepancy.breakaway import Breakaway
-from sea_ident.discrepancy.data import PeriodData
-from sea_ident.discrepancy.findings import MissingEffect, Verdict, chance
-from sea_ident.discrepancy.gap import Gap
-from sea_ident.discrepancy.heldout import Kind
-from sea_ident.discrepancy.judge import FEWEST_TO_SEARCH
-from sea_ident.discrepancy.lack import LACK_LEVEL
-from sea_ident.discrepancy.reference import ParameterChange
-from sea_ident.discrepancy.standing import Standing
-from sea_ident.discrepancy.transfer import TRANSFERS, TRANSFERS_ALONE
-from sea_ident.discrepancy.trend import TrendTest
-from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.discrepancy.bench.gap import Gap
+from sea_ident.discrepancy.bench.judge import FEWEST_TO_SEARCH
+from sea_ident.discrepancy.bench.lack import LACK_LEVEL
+from sea_ident.discrepancy.compared.heldout import Kind
+from sea_ident.discrepancy.compared.reference import ParameterChange
+from sea_ident.discrepancy.compared.transfer import TRANSFERS, TRANSFERS_ALONE
+from sea_ident.discrepancy.measured.data import PeriodData
+from sea_ident.discrepancy.measured.standing import Standing
+from sea_ident.discrepancy.nameless.unnamed import Unnamed
+from sea_ident.discrepancy.result.findings import MissingEffect, Verdict, chance
+from sea_ident.discrepancy.search.breakaway import Breakaway
+from sea_ident.discrepancy.trends.trend import TrendTest
 from sea_ident.effects.base import titled
 from sea_ident.robot import Robot
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
 from sea_ident.estimation import Model
 from sea_ident.excitation import Excitation
 from sea_ident.validation import Validation

@@ -12,7 +12,7 @@ from markupsafe import Markup
 import sea_ident
 from sea_ident.arguments import expect
 from sea_ident.atomic import atomic_file
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
 from sea_ident.estimation import Model
 from sea_ident.exceptions import SeaIdentError
 from sea_ident.excitation import Excitation

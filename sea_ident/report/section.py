@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
 from sea_ident.estimation import Model
 from sea_ident.report.content import Content
 

@@ -16,11 +16,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from sea_ident import identify, load_robot
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import period_data, wide_processing
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.lack import remainder_share
+from sea_ident.discrepancy.bench.settle import Settled, settle
 from sea_ident.discrepancy.diagnose import model_effects
-from sea_ident.discrepancy.lack import remainder_share
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.measured.data import period_data, wide_processing
 from sea_ident.recordings import read_recording
 
 MULTIPLE = 2.0

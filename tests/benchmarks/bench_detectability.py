@@ -17,7 +17,7 @@ import numpy as np
 
 import sea_ident
 from sea_ident.discrepancy import Diagnosis
-from sea_ident.discrepancy.findings import Detectability
+from sea_ident.discrepancy.result.findings import Detectability
 from sea_ident.effects import make_effect
 from sea_ident.effects.signal import SignalEffect
 from sea_ident.exceptions import SeaIdentWarning

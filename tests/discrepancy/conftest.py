@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.search import search
-from sea_ident.discrepancy.settle import Settled, settle
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.settle import Settled, settle
+from sea_ident.discrepancy.measured.data import period_data, wide_processing
+from sea_ident.discrepancy.search.search import search
 from sea_ident.effects import base_effects, make_effect, spring_effects
 from sea_ident.motion import FourierSeries
 from sea_ident.recordings import Recording

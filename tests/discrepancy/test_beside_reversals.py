@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import beside_reversals
-from sea_ident.discrepancy.assess import detectability
-from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.judge import EQUALLY_GOOD
+from sea_ident.discrepancy.bench.lack import lack_of_fit
+from sea_ident.discrepancy.bench.settle import settle
 from sea_ident.discrepancy.beside_reversals import friction_of_the_slow, searched_beside_reversals
-from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.confirm import FAR, Confirmed, confirm
-from sea_ident.discrepancy.data import away_from_reversals
-from sea_ident.discrepancy.heldout import held_out
-from sea_ident.discrepancy.judge import EQUALLY_GOOD
-from sea_ident.discrepancy.lack import lack_of_fit
-from sea_ident.discrepancy.search import Selection, search
-from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.standing import BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.discrepancy.compared.heldout import held_out
+from sea_ident.discrepancy.evidence.assess import detectability
+from sea_ident.discrepancy.measured.data import away_from_reversals
+from sea_ident.discrepancy.measured.standing import BESIDE_REVERSALS, compared_beside_reversals
+from sea_ident.discrepancy.search.candidates import scan
+from sea_ident.discrepancy.search.confirm import FAR, Confirmed, confirm
+from sea_ident.discrepancy.search.search import Selection, search
 from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter, SmoothCoulomb
 
@@ -71,7 +71,7 @@ def test_a_search_sees_what_acts_beside_reversals_only_by_what_lets_go_late(stic
     bench, _ = sticking
     if not late:
         for module in ("next_effect", "confirm"):
-            monkeypatch.setattr(f"sea_ident.discrepancy.{module}.lets_go_late", lambda *_: False)
+            monkeypatch.setattr(f"sea_ident.discrepancy.search.{module}.lets_go_late", lambda *_: False)
     assert named(confirm(bench, search(bench, bench.effects)).selection) == seen
 
 

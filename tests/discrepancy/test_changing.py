@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sea_ident.discrepancy.bench.gap import gap_of
+from sea_ident.discrepancy.bench.settle import settle
 from sea_ident.discrepancy.changing import Changing, followed
-from sea_ident.discrepancy.gap import gap_of
-from sea_ident.discrepancy.heldout import HeldOut
-from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.discrepancy.compared.heldout import HeldOut
+from sea_ident.discrepancy.search.search import Selection
+from sea_ident.discrepancy.trends.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.estimation import TrendTerm
 from sea_ident.recordings import Recording

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy import close, forward
-from sea_ident.discrepancy.data import wide_processing
-from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import Alternative, LackOfFit, MissingEffect, Verdict
-from sea_ident.discrepancy.forward import simulation_gap
+from sea_ident.discrepancy import close
+from sea_ident.discrepancy.measured.data import wide_processing
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.findings import Alternative, LackOfFit, MissingEffect, Verdict
+from sea_ident.discrepancy.simulated import forward
+from sea_ident.discrepancy.simulated.forward import simulation_gap
 from sea_ident.effects import base_effects, make_effect
 from sea_ident.estimation import identify, read_model
 from sea_ident.exceptions import DivergenceError, SeaIdentWarning

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.check import subset
-from sea_ident.discrepancy.columns import without_digits
-from sea_ident.discrepancy.data import (
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.columns import without_digits
+from sea_ident.discrepancy.bench.settle import settle, settle_again
+from sea_ident.discrepancy.measured.check import subset
+from sea_ident.discrepancy.measured.data import (
     away_from_reversals,
     equation_row,
     period_data,
     spectrum,
     wide_processing,
 )
-from sea_ident.discrepancy.settle import settle, settle_again
 from sea_ident.effects import State, base_effects, corrected_motion, make_effect, spring_effects
 from sea_ident.effects.rigid_bodies import RigidBodies
 from sea_ident.regressor import prior_parameters

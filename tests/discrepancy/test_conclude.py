@@ -13,8 +13,11 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict, searching
+from sea_ident.discrepancy.bench.gap import Gap, torque_by_joint
+from sea_ident.discrepancy.bench.lack import remainder_share
+from sea_ident.discrepancy.bench.settle import settle
 from sea_ident.discrepancy.changing import Changing
-from sea_ident.discrepancy.check import Findings
+from sea_ident.discrepancy.compared.heldout import HeldOut, Kind
 from sea_ident.discrepancy.conclude import (
     _known_better,
     _locations,
@@ -26,17 +29,14 @@ from sea_ident.discrepancy.conclude import (
     verdict_of,
     without_sizes,
 )
-from sea_ident.discrepancy.confirm import Confirmed
-from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
-from sea_ident.discrepancy.findings import LackOfFit, Location, MissingEffect
-from sea_ident.discrepancy.gap import Gap, torque_by_joint
-from sea_ident.discrepancy.heldout import HeldOut, Kind
-from sea_ident.discrepancy.lack import remainder_share
-from sea_ident.discrepancy.locate import locate
-from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.trend import Trend, TrendTest
-from sea_ident.discrepancy.unnamed import Unnamed
+from sea_ident.discrepancy.evidence.locate import locate
+from sea_ident.discrepancy.measured.check import Findings
+from sea_ident.discrepancy.nameless.unnamed import Unnamed
+from sea_ident.discrepancy.result.diagnosis import Diagnosis, read_diagnosis
+from sea_ident.discrepancy.result.findings import LackOfFit, Location, MissingEffect
+from sea_ident.discrepancy.search.confirm import Confirmed
+from sea_ident.discrepancy.search.search import Selection
+from sea_ident.discrepancy.trends.trend import Trend, TrendTest
 from sea_ident.effects import Column, Contribution, Effect, Side, effect_classes
 from sea_ident.effects.friction_drift import FrictionDrift
 from sea_ident.exceptions import SeaIdentWarning

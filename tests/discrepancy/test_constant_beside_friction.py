@@ -2,9 +2,9 @@
 
 import pytest
 
-from sea_ident.discrepancy.search import Selection
-from sea_ident.discrepancy.settle import settle, settle_again
-from sea_ident.discrepancy.unnamed import unnamed
+from sea_ident.discrepancy.bench.settle import settle, settle_again
+from sea_ident.discrepancy.nameless.unnamed import unnamed
+from sea_ident.discrepancy.search.search import Selection
 from sea_ident.effects import make_effect
 
 

@@ -11,7 +11,7 @@ import pytest
 import sea_ident
 from sea_ident import side_by_side
 from sea_ident.discrepancy import searching
-from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.discrepancy.trends.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError
 from sea_ident.recordings import Recording

@@ -9,10 +9,10 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.data import EquationKind, period_data
-from sea_ident.discrepancy.settle import settle
-from sea_ident.discrepancy.standing import held_still, not_compared_at
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.settle import settle
+from sea_ident.discrepancy.measured.data import EquationKind, period_data
+from sea_ident.discrepancy.measured.standing import held_still, not_compared_at
 from sea_ident.effects import make_effect
 from sea_ident.estimation.observations import stands
 from sea_ident.exceptions import SeaIdentWarning

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.data import towards
-from sea_ident.discrepancy.free_shapes import moving, signal_effects
-from sea_ident.discrepancy.periods import model_torque, torques_of
+from sea_ident.discrepancy.bench.free_shapes import moving, signal_effects
+from sea_ident.discrepancy.bench.periods import model_torque, torques_of
+from sea_ident.discrepancy.measured.data import towards
 from sea_ident.effects import Contribution, State, corrected_motion, make_effect
 from sea_ident.effects.spring_hysteresis import SpringHysteresis
 

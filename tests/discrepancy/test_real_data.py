@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy.base_model import missing_friction
-from sea_ident.discrepancy.circular import circular_springs
-from sea_ident.discrepancy.pushes import find_pushes
+from sea_ident.discrepancy.measured.circular import circular_springs
+from sea_ident.discrepancy.measured.pushes import find_pushes
+from sea_ident.discrepancy.search.base_model import missing_friction
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import SeaIdentWarning
 from sea_ident.recordings import Recording

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sea_ident
-from sea_ident.discrepancy.assess import detectability
-from sea_ident.discrepancy.bench import Bench
-from sea_ident.discrepancy.candidates import scan
-from sea_ident.discrepancy.data import period_data, wide_processing
-from sea_ident.discrepancy.search import search
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.evidence.assess import detectability
+from sea_ident.discrepancy.measured.data import period_data, wide_processing
+from sea_ident.discrepancy.search.candidates import scan
+from sea_ident.discrepancy.search.search import search
 from sea_ident.effects import make_effect
 from sea_ident.estimation.identify import default_effects
 from sea_ident.motion import FourierSeries

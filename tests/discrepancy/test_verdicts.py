@@ -9,11 +9,11 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict
-from sea_ident.discrepancy.check import Findings
+from sea_ident.discrepancy.bench.gap import Gap
 from sea_ident.discrepancy.conclude import explains, verdict_of
-from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter
-from sea_ident.discrepancy.gap import Gap
-from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.discrepancy.measured.check import Findings
+from sea_ident.discrepancy.result.findings import Alternative, MissingEffect, MissingParameter
+from sea_ident.discrepancy.trends.trend import Trend, TrendTest
 from sea_ident.effects import make_effect
 from sea_ident.exceptions import DiagnosisError, SeaIdentError, SeaIdentWarning
 from sea_ident.motion import FourierSeries

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy import searching
-from sea_ident.discrepancy.bench import Bench
+from sea_ident.discrepancy.bench.bench import Bench
+from sea_ident.discrepancy.bench.settle import settle
 from sea_ident.discrepancy.conclude import unexplained
-from sea_ident.discrepancy.confirm import Confirmed, confirm, without_the_slow
-from sea_ident.discrepancy.data import away_from_reversals, period_data, wide_processing
-from sea_ident.discrepancy.search import Selection, search
-from sea_ident.discrepancy.settle import settle
+from sea_ident.discrepancy.measured.data import away_from_reversals, period_data, wide_processing
+from sea_ident.discrepancy.search.confirm import Confirmed, confirm, without_the_slow
+from sea_ident.discrepancy.search.search import Selection, search
 from sea_ident.effects import base_effects, spring_effects
 from sea_ident.motion import FourierSeries
 
@@ -83,10 +83,11 @@ def test_no_search_begins_that_would_be_given_up(lingering, monkeypatch, added, 
         begun.append(found)
         return Selection(start, start, 0, ())
 
-    monkeypatch.setattr("sea_ident.discrepancy.confirm.HOPELESS", 1.0)
-    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", searched)
+    monkeypatch.setattr("sea_ident.discrepancy.search.confirm.HOPELESS", 1.0)
+    monkeypatch.setattr("sea_ident.discrepancy.search.confirm.search", searched)
     monkeypatch.setattr(
-        "sea_ident.discrepancy.confirm.scan", lambda far, fit, noise: [SimpleNamespace(gain=promised * fit.excess)]
+        "sea_ident.discrepancy.search.confirm.scan",
+        lambda far, fit, noise: [SimpleNamespace(gain=promised * fit.excess)],
     )
     assert without_the_slow(bench, Confirmed(Selection(start, start, added, ()), bench, start, start)) is None
     assert bool(begun) is begins
@@ -105,10 +106,10 @@ def test_what_explains_most_of_what_is_left_is_taken(lingering, monkeypatch, lef
         return replace(start, fit=replace(fit, whitened=size * fit.whitened))
 
     found = Selection(start, leaving(left), 1, (1e-9,))
-    monkeypatch.setattr("sea_ident.discrepancy.confirm.settle_again", lambda far, fit: leaving(1.0))
-    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", lambda far, effects, begun=None: found)
+    monkeypatch.setattr("sea_ident.discrepancy.search.confirm.settle_again", lambda far, fit: leaving(1.0))
+    monkeypatch.setattr("sea_ident.discrepancy.search.confirm.search", lambda far, effects, begun=None: found)
     monkeypatch.setattr(
-        "sea_ident.discrepancy.confirm.scan", lambda far, fit, noise: [SimpleNamespace(gain=0.9 * fit.excess)]
+        "sea_ident.discrepancy.search.confirm.scan", lambda far, fit, noise: [SimpleNamespace(gain=0.9 * fit.excess)]
     )
     second = without_the_slow(bench, Confirmed(Selection(start, start, 0, ()), bench, start, start))
     assert (second is not None) is taken
@@ -149,7 +150,7 @@ def test_the_search_goes_on_from_what_explains_nearly_all(lingering, monkeypatch
         begun.append(found)
         return search(far, effects, found)
 
-    monkeypatch.setattr("sea_ident.discrepancy.confirm.search", noted)
+    monkeypatch.setattr("sea_ident.discrepancy.search.confirm.search", noted)
     second = without_the_slow(bench, confirm(bench, first))
     (before,) = begun
     assert before.final is first.final

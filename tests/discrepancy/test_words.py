@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.diagnosis import _gap
-from sea_ident.discrepancy.findings import Alternative, MissingEffect, MissingParameter, Verdict, chance
-from sea_ident.discrepancy.gap import Gap, gap_of
-from sea_ident.discrepancy.heldout import Kind
-from sea_ident.discrepancy.reference import ParameterChange
-from sea_ident.discrepancy.standing import Standing
-from sea_ident.discrepancy.trend import Trend, TrendTest
+from sea_ident.discrepancy.bench.gap import Gap, gap_of
+from sea_ident.discrepancy.compared.heldout import Kind
+from sea_ident.discrepancy.compared.reference import ParameterChange
+from sea_ident.discrepancy.measured.standing import Standing
+from sea_ident.discrepancy.result.diagnosis import _gap
+from sea_ident.discrepancy.result.findings import Alternative, MissingEffect, MissingParameter, Verdict, chance
+from sea_ident.discrepancy.trends.trend import Trend, TrendTest
 from sea_ident.discrepancy.words import Facts, _gap_sentence, paragraph, reservations
 from sea_ident.effects import make_effect
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.free_shapes import room
-from sea_ident.discrepancy.judge import slowest
+from sea_ident.discrepancy.bench.free_shapes import room
+from sea_ident.discrepancy.bench.judge import slowest
 from sea_ident.effects import effect_from_dict, make_effect
 from sea_ident.effects.orders import highest_order, motors_too_fast, orders
 from sea_ident.effects.state import State

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.free_shapes import free_shapes, room
-from sea_ident.discrepancy.judge import at_a_bound
+from sea_ident.discrepancy.bench.free_shapes import free_shapes, room
+from sea_ident.discrepancy.bench.judge import at_a_bound
 from sea_ident.effects import effect_from_dict, make_effect
 from sea_ident.effects.speeds import SLOW, speed_scale
 from sea_ident.effects.state import State

@@ -6,7 +6,7 @@ import pytest
 
 from estimation.synthetic import leg_series, record, truth_of
 from sea_ident.base_parameters import find_base_parameters
-from sea_ident.discrepancy.data import around_reversals, period_data
+from sea_ident.discrepancy.measured.data import around_reversals, period_data
 from sea_ident.effects import base_effects
 from sea_ident.estimation import Agreement, identify
 from sea_ident.estimation.agreement import agreement

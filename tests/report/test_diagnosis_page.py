@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, read_diagnosis
-from sea_ident.discrepancy.findings import (
+from sea_ident.discrepancy.bench.gap import Gap
+from sea_ident.discrepancy.result.diagnosis import Diagnosis, read_diagnosis
+from sea_ident.discrepancy.result.findings import (
     Alternative,
     Detectability,
     LackOfFit,
@@ -21,7 +22,6 @@ from sea_ident.discrepancy.findings import (
     Verdict,
     Waveforms,
 )
-from sea_ident.discrepancy.gap import Gap
 from sea_ident.effects import make_effect
 from sea_ident.effects.friction_drift import FrictionDrift
 from sea_ident.estimation import TrendTerm

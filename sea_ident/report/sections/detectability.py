@@ -2,7 +2,7 @@
 
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
 from sea_ident.report.section import DiagnosisSection
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, torque_unit, units_by_joint
-from sea_ident.discrepancy.gap import Gap
+from sea_ident.discrepancy.bench.gap import Gap
+from sea_ident.discrepancy.result.diagnosis import Diagnosis, torque_unit, units_by_joint
 from sea_ident.report.bars import bars, bars_legend
 from sea_ident.report.chart import Band, Chart, Line
 from sea_ident.report.section import DiagnosisSection

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sea_ident.discrepancy.diagnosis import Diagnosis, units_by_joint
+from sea_ident.discrepancy.result.diagnosis import Diagnosis, units_by_joint
 from sea_ident.report.matrix import matrix
 from sea_ident.report.section import DiagnosisSection
 

@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sea_ident._typing import FloatArray
-from sea_ident.discrepancy.diagnosis import Diagnosis, torque_unit, units_by_joint
-from sea_ident.discrepancy.findings import MissingEffect, Waveforms
+from sea_ident.discrepancy.result.diagnosis import Diagnosis, torque_unit, units_by_joint
+from sea_ident.discrepancy.result.findings import MissingEffect, Waveforms
 from sea_ident.report.chart import Band, Chart, Line, Mark, Points
 from sea_ident.report.section import DiagnosisSection
 

@@ -2,9 +2,9 @@
 
 from typing import Any, ClassVar
 
-from sea_ident.discrepancy.diagnosis import Diagnosis
-from sea_ident.discrepancy.findings import Verdict, chance
-from sea_ident.discrepancy.lack import LACK_LEVEL
+from sea_ident.discrepancy.bench.lack import LACK_LEVEL
+from sea_ident.discrepancy.result.diagnosis import Diagnosis
+from sea_ident.discrepancy.result.findings import Verdict, chance
 from sea_ident.report.section import DiagnosisSection
 
 MEANING = {

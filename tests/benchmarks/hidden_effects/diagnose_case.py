@@ -79,7 +79,7 @@ def without_effects(names: list[str]) -> Iterator[None]:
     places = [m for m in known.values() if getattr(m, "effect_classes", None) is effect_classes]
     patches = [patch.object(module, "effect_classes", fewer) for module in places]
     if "link_friction" in names:  # nor what the description gives of it
-        patches.append(patch("sea_ident.discrepancy.as_described.left_out", lambda robot, effects: ()))
+        patches.append(patch("sea_ident.discrepancy.search.as_described.left_out", lambda robot, effects: ()))
     assert effects_package in places
     for p in patches:
         p.start()

@@ -1,0 +1,1 @@
+"""Models made of effects, fitted to one recording in its noise."""

@@ -1,0 +1,1 @@
+"""What is told beside a name: where, how sure, what else, what could not be seen, and what to measure next."""

@@ -1,0 +1,1 @@
+"""What comes of a diagnosis: its parts, and the model with what was found."""

@@ -1,0 +1,1 @@
+"""Which effects the mean of the periods lacks."""

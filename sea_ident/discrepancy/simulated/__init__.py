@@ -1,0 +1,1 @@
+"""The gap in forward simulation, before and after."""

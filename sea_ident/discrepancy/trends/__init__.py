@@ -1,0 +1,1 @@
+"""What changes from period to period, which the mean does not show."""
