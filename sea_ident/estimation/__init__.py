@@ -25,7 +25,8 @@ from sea_ident.estimation.spring_result import SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.springs import identify_springs
 from sea_ident.estimation.trend_term import TrendTerm
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
-from sea_ident.estimation.update import Change, Update, updated
+from sea_ident.estimation.update import updated
+from sea_ident.estimation.update_result import Change, Update
 
 __all__ = [
     "Agreement",

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +16,9 @@ from sea_ident.estimation.observations import base_rows
 from sea_ident.estimation.spring_result import SpringResult, SpringTerm
 from sea_ident.estimation.trend_term import TrendTerm, trend_torque
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
+from sea_ident.estimation.update_result import Update
 from sea_ident.motion import Motion
 from sea_ident.robot import Robot
-
-if TYPE_CHECKING:
-    from sea_ident.estimation.update import Update
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +129,7 @@ class Model:
     fit: Fit
     excerpt: Excerpt
     recording: str
-    update: "Update | None" = None
+    update: Update | None = None
     trends: tuple[TrendTerm, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

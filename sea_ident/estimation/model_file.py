@@ -19,7 +19,7 @@ from sea_ident.estimation.model import Excerpt, Fit, Model
 from sea_ident.estimation.spring_result import SpringLack, SpringResult, SpringTerm, Verdict
 from sea_ident.estimation.trend_term import TrendTerm
 from sea_ident.estimation.uncertainty import CovarianceKind, Uncertainty
-from sea_ident.estimation.update import Update
+from sea_ident.estimation.update_result import Update
 from sea_ident.exceptions import ModelFileError, OutputError, SeaIdentError
 from sea_ident.motion import Motion
 from sea_ident.regressor import model_columns
