@@ -199,6 +199,7 @@ LEFT_OVER = {
 """Part that a formula of the library may leave: first order only, or a memory of what was before; else 0.03."""
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("entry", catalogue.LIBRARY, ids=lambda entry: entry.effect)
 def test_formulas_of_the_library_agree_with_independent_laws(entry: catalogue.Entry, leg: gap.Gauge) -> None:
     """An effect acts in MuJoCo by a law of the benchmark's own; the library's columns explain what it does."""
@@ -268,6 +269,7 @@ def test_every_size_of_the_library_is_scored(effect: str, leg: gap.Gauge) -> Non
     assert size_errors(planted, {"parameters": off}, case, leg.truth) == pytest.approx(np.full(len(errors), 2.0))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("form", ["library", "lugre"])
 def test_friction_with_a_memory_is_right_to_the_second_order_of_the_step(form: str, leg: gap.Gauge) -> None:
     """As all else is: a bristle that is half a step ahead of its motor bends over a distance that nobody planted."""

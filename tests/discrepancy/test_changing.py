@@ -43,6 +43,7 @@ def gap(held):
     return gap_of(held.bench, held.before, held.after, held.noise)
 
 
+@pytest.mark.scenario
 def test_friction_of_another_temperature_is_predicted_on_data_that_were_held_out(warmed):
     recordings, benches, selection, held = warmed
     changing = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data)
@@ -65,6 +66,7 @@ def test_friction_of_another_temperature_is_predicted_on_data_that_were_held_out
     assert set(changing.gaps(benches[0], selection.final.fit, trends, held)) == {"training", "holdout"}
 
 
+@pytest.mark.scenario
 def test_without_its_temperature_there_nothing_is_predicted(warmed):
     recordings, benches, selection, held = warmed
     changing, fit = Changing.of(SimpleNamespace(trends=()), recordings[0], benches[0].data), selection.final.fit
@@ -81,6 +83,7 @@ def test_without_its_temperature_there_nothing_is_predicted(warmed):
     assert followed(None, nothing.changed) is None
 
 
+@pytest.mark.scenario
 def test_what_drifts_by_time_is_predicted_where_the_other_recording_began_as_this_one(warmed):
     """The knee warms up anew in both: as friction that grows by time, it is 2.3 N m/min less soon after the begin."""
     recordings, benches, selection, held = warmed
@@ -103,6 +106,7 @@ def test_what_drifts_by_time_is_predicted_where_the_other_recording_began_as_thi
     assert text.startswith("friction_drift at knee: other did not begin where the recording did")
 
 
+@pytest.mark.scenario
 def test_what_a_model_holds_is_looked_for_first(warmed):
     recordings, benches, selection, _ = warmed
     held = SimpleNamespace(trends=(TrendTerm(make_effect("friction_drift", "knee"), (0.0, 0.1), (0.0, 0.0)),))

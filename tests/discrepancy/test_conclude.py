@@ -160,6 +160,7 @@ def test_what_is_left_of_another_motion_is_told_where_it_is_more_than_parameters
     assert beyond_the_motion(replace(held, kind=Kind.OTHER_PERIODS), gap) == {}
 
 
+@pytest.mark.scenario
 def test_nothing_is_missing_and_yet_something_was_changed_before_the_motion_that_was_held_out(laboratory):
     changed = laboratory.record([("torque_offset", "knee", [1.5], {})], motion=1)
     found = diagnosed(laboratory, laboratory.record(periods=12), holdout=changed)

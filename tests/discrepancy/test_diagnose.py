@@ -67,6 +67,7 @@ def test_the_planted_effect_is_named_at_its_joint(found):
     assert (found.missing[0].effect, found.missing[0].joint) == ("stribeck_friction", "knee")
 
 
+@pytest.mark.scenario
 def test_a_second_core_changes_nothing(stribeck, stribeck_model, found, monkeypatch, tmp_path):
     """Not a digit; and what is done is told once."""
     training, holdout = stribeck
@@ -160,6 +161,7 @@ def test_nothing_is_concluded_where_joints_changed_places(intact, intact_model):
     assert any("cannot be used; nothing was tested on it" in text for text in tested.warnings)
 
 
+@pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_nothing_is_looked_for_where_a_torque_has_the_wrong_sign(intact, intact_model, monkeypatch):
     """It is said of which joint; and what is doubtful about the springs of the model is repeated."""

@@ -44,6 +44,7 @@ def diagnosed(laboratory, recording, **options):
         return sea_ident.diagnose(model, recording, period=PERIOD, **options)
 
 
+@pytest.mark.scenario
 def test_nothing_is_missing_where_the_last_joint_is_held(holding_laboratory):
     """None of its samples is compared, and what is left of the columns of its friction is rounding."""
     found = diagnosed(holding_laboratory, holding_laboratory.record(motion=2, periods=10))
@@ -97,6 +98,7 @@ def test_a_joint_is_taken_out_of_a_comparison_as_a_whole(laboratory):
     assert now.fit.statistic < 1.3 * now.fit.dof
 
 
+@pytest.mark.scenario
 def test_of_a_motor_that_is_held_no_friction_is_identified_and_the_others_are_as_sure(holding_laboratory):
     """A friction that follows the noise of its encoder would be of any size, and the others unsure with it."""
     laboratory, leg = holding_laboratory, holding_laboratory.leg
@@ -136,6 +138,7 @@ def test_motors_that_are_slow_are_not_held(holding_laboratory):
     assert still.tolist() == [True, False, False]
 
 
+@pytest.mark.scenario
 def test_what_only_a_motor_that_is_held_tells_is_as_unsure_as_the_friction_that_holds_it(holding_laboratory):
     """It may go along with the inertia of the thigh, and is one error all along; the others do not know of it."""
     laboratory, leg = holding_laboratory, holding_laboratory.leg

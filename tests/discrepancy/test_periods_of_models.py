@@ -29,6 +29,7 @@ def of_each(bench, fit):
     return np.stack(found, axis=1)
 
 
+@pytest.mark.scenario
 def test_periods_together_are_each_by_itself(bench):
     """Beside errors of sensors and without, with what remembers its path; the first is kept while the next is made."""
     memory = SpringHysteresis("knee", 0.002)

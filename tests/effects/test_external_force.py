@@ -58,16 +58,16 @@ def test_it_pushes_for_as_long_as_it_does_between_samples_too(start, stop):
     np.testing.assert_allclose(make_effect("external_force", "knee").share_of(time), 1.0)
 
 
-@pytest.mark.parametrize(("start", "stop"), [(0.6486, 1.4043), (0.6511, 1.4012)])
+@pytest.mark.parametrize(("start", "stop"), [(0.1236, 0.3043), (0.1261, 0.3012)])
 def test_a_simulation_hangs_on_no_step_that_an_edge_falls_into(start, stop):
     """Off by a millisecond, an edge would move the links by 1e-4 rad and more."""
-    leg, series = sea_ident.load_robot("exo_leg"), FourierSeries(0.5, np.zeros(3), *np.full((2, 3, 1), 0.2))
-    push = PlantedEffect(make_effect("external_force", "knee", start=start, stop=stop, period=2.0), 5.0 * FORCE)
+    leg, series = sea_ident.load_robot("exo_leg"), FourierSeries(2.0, np.zeros(3), *np.full((2, 3, 1), 0.05))
+    push = PlantedEffect(make_effect("external_force", "knee", start=start, stop=stop, period=0.5), 5.0 * FORCE)
     motions = [
         simulate(
             leg, series, periods=1, effects=[push], sensors=SensorNoise.none(), jitter=FrictionJitter.none(), step=step
         ).motion
-        for step in (None, 2.5e-4)
+        for step in (None, 1e-3)
     ]
     assert np.abs(motions[0].q - motions[1].q).max() < 1e-5
 

@@ -143,12 +143,13 @@ def recorded(robot, effect, value, seed):
     return Recording(np.arange(periods * len(motion)) / 200.0, columns, "chain")
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "axes", "joint", "value"),
     [
         ("load_dependent_friction", (LEVEL, LEVEL), "j0", 0.05),
-        pytest.param("directional_efficiency", (LEVEL, LEVEL), "j0", 0.08, marks=pytest.mark.scenario),
-        pytest.param("load_dependent_friction", (UPRIGHT, LEVEL, LEVEL), "j1", 0.05, marks=pytest.mark.scenario),
+        ("directional_efficiency", (LEVEL, LEVEL), "j0", 0.08),
+        ("load_dependent_friction", (UPRIGHT, LEVEL, LEVEL), "j1", 0.05),
     ],
 )
 def test_a_loss_is_found_with_its_size_and_by_no_other_name_where_the_rotor_is_not_known(name, axes, joint, value):

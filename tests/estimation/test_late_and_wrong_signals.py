@@ -46,6 +46,7 @@ def case(request, leg, series):
     return (*base_effects(leg), effect), process(run.recording, leg, period=PERIOD)
 
 
+@pytest.mark.scenario
 def test_springs_are_those_of_the_robot(leg, case):
     effects, processed = case
     truth = plant_from_robot(leg)
@@ -57,6 +58,7 @@ def test_springs_are_those_of_the_robot(leg, case):
         assert spring.damping == pytest.approx(truth.spring_damping[i], rel=0.05)
 
 
+@pytest.mark.scenario
 def test_friction_is_that_of_the_robot(leg, case):
     effects, processed = case
     truth = plant_from_robot(leg)
@@ -67,6 +69,7 @@ def test_friction_is_that_of_the_robot(leg, case):
         assert found[f"{joint}.viscous_friction"] == pytest.approx(truth.viscous_friction[i], rel=1e-2)
 
 
+@pytest.mark.scenario
 def test_the_sum_of_both_rows_gives_the_torque_as_it_was_recorded(leg, case):
     effects, processed = case
     truth = plant_from_robot(leg).values_of(effects[:-1])

@@ -52,6 +52,7 @@ def repeated(leg, velocity_loop):
     return found
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("velocity_loop", [60.0, 200.0], ids=["slow drives", "fast drives"])
 def test_values_are_off_by_no_more_than_they_say(leg, velocity_loop):
     models = [identify(leg, recording, period=PERIOD) for recording in repeated(leg, velocity_loop)]

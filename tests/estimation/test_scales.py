@@ -55,6 +55,7 @@ def test_no_springs_say_nothing(leg):
     assert other_scale(leg, []) == []
 
 
+@pytest.mark.scenario
 def test_torques_before_the_gear_are_told(leg):
     series = sea_ident.design_excitation(leg, base_frequency=0.2, harmonics=3, starts=1, seed=0).series
     recording = simulate(leg, series, periods=3, seed=0).recording

@@ -64,6 +64,7 @@ def expected_std(before, alone):
 WEAK = ("foot.mz", "foot.Iyy", "ankle.viscous_friction", "ankle.coulomb_friction")
 
 
+@pytest.mark.scenario
 def test_the_first_recording_says_what_it_does_not_tell(campaigns):
     for _, before, _, _ in campaigns:
         known = what_is_known(before)
@@ -71,6 +72,7 @@ def test_the_first_recording_says_what_it_does_not_tell(campaigns):
         assert known.weakest_percent > 20.0
 
 
+@pytest.mark.scenario
 def test_the_designed_recording_beats_another_of_the_first(campaigns):
     gains = []
     for first, before, after, (alone, _) in campaigns:
@@ -83,6 +85,7 @@ def test_the_designed_recording_beats_another_of_the_first(campaigns):
     assert mean["ankle.viscous_friction"] > 20.0
 
 
+@pytest.mark.scenario
 def test_the_designed_recording_beats_excitations_that_do_not_know(leg, campaigns):
     gains = []
     for seed, (_, before, after, (alone, _)) in zip(SEEDS, campaigns, strict=True):
@@ -97,6 +100,7 @@ def test_the_designed_recording_beats_excitations_that_do_not_know(leg, campaign
     assert min(gains) > -0.1
 
 
+@pytest.mark.scenario
 def test_the_estimate_from_both_recordings_holds_the_truth(campaigns, truth):
     less = []
     for _, before, _, (_, joint) in campaigns:

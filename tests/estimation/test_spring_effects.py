@@ -39,6 +39,7 @@ def term(model, joint):
     return next(spring.terms[0] for spring in model.springs if spring.joint == joint)
 
 
+@pytest.mark.scenario
 def test_the_planted_values_are_found_within_their_uncertainty(model):
     found = term(model, "knee")
     assert found.effect.name == "spring_hysteresis"
@@ -49,6 +50,7 @@ def test_the_planted_values_are_found_within_their_uncertainty(model):
     assert abs(offset.values[0] - OFFSET) < 5.0 * offset.stds[0]
 
 
+@pytest.mark.scenario
 def test_the_law_beside_them_is_that_of_the_spring(leg, model, recording):
     with (
         pytest.warns(SeaIdentWarning, match="spring of ankle: its stiffness comes out negative"),
@@ -65,6 +67,7 @@ def test_the_law_beside_them_is_that_of_the_spring(leg, model, recording):
     assert with_term.rms_residual < 0.3 * without.rms_residual
 
 
+@pytest.mark.scenario
 def test_covariance_is_that_of_law_and_terms_together(model):
     spring = next(s for s in model.springs if s.joint == "knee")
     full = np.array(spring.full_covariance)
@@ -74,6 +77,7 @@ def test_covariance_is_that_of_law_and_terms_together(model):
     assert np.linalg.eigvalsh(full)[0] > -1e-9 * np.linalg.eigvalsh(full)[-1]
 
 
+@pytest.mark.scenario
 def test_they_stand_among_the_parameters(model):
     found = {p.name: p for p in model.parameters}
     assert found["knee.spring_hysteresis_narrow"].value == term(model, "knee").values[0]
@@ -81,6 +85,7 @@ def test_they_stand_among_the_parameters(model):
     assert [e.name for e in model.spring_effects] == ["spring_hysteresis", "spring_offset"]
 
 
+@pytest.mark.scenario
 def test_saved_and_read_back(model, tmp_path):
     model.save(tmp_path / "m.json")
     record = json.loads((tmp_path / "m.json").read_text())
@@ -92,6 +97,7 @@ def test_saved_and_read_back(model, tmp_path):
     assert again.spring_effects == model.spring_effects
 
 
+@pytest.mark.scenario
 def test_a_model_without_them_is_written_as_before(model, tmp_path):
     plain = replace(model, springs=tuple(replace(s, terms=(), full_covariance=()) for s in model.springs))
     plain.save(tmp_path / "m.json")
@@ -145,6 +151,7 @@ def test_the_model_simulated_moves_like_the_truth(leg, model):
     assert away < 0.1 * without
 
 
+@pytest.mark.scenario
 def test_export_says_what_it_leaves_out(model, tmp_path):
     with pytest.warns(SeaIdentWarning, match=r"knee\.spring_hysteresis_narrow.*ankle\.spring_offset: left out"):
         export_urdf(model, tmp_path / "leg.urdf")
@@ -152,6 +159,7 @@ def test_export_says_what_it_leaves_out(model, tmp_path):
         export_mjcf(model, tmp_path / "leg.xml")
 
 
+@pytest.mark.scenario
 def test_springs_identified_again_keep_them(leg, model, recording):
     processed = process(recording, leg, period=leg_series().period)
     again = identify_springs(model, processed)
@@ -188,5 +196,6 @@ def test_dry_friction_that_never_slips_is_told_by_its_rest_alone(leg, tmp_path, 
     assert read_model(tmp_path / "m.json").springs[1].terms[0].by_rest
 
 
+@pytest.mark.scenario
 def test_what_slips_is_not_told_by_its_rest(model):
     assert not any(t.by_rest for spring in model.springs for t in spring.terms)

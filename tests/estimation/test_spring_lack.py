@@ -141,6 +141,7 @@ def test_zeros_apart_no_longer_make_a_wrong_stiffness_sure(leg, truth, joint, ze
     assert doubted is (spring.verdict == "stiffening" and not supported)
 
 
+@pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_a_constant_torque_in_a_motor_no_longer_makes_a_wrong_stiffness_sure(leg, tmp_path):
     planted = PlantedEffect(make_effect("torque_offset", "hip"), np.array([6.0]))

@@ -33,6 +33,7 @@ def drawn(rng, periods=10, samples=400, by_parameters=0.0, beyond=None, scatter=
     return spring_misfit(left + each - each.mean(axis=0), inverse, columns, rows, known), inverse @ mean
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("by_parameters", [0.0, 0.5, 1.0, 10.0])
 def test_noise_alone_is_no_misfit_whatever_carries_it(by_parameters):
     rng = np.random.default_rng(5)
@@ -129,6 +130,7 @@ def slipping(leg):
     return process(recording, leg, period=leg_series().period)
 
 
+@pytest.mark.scenario
 def test_a_spring_that_lacks_something_says_so_and_its_intervals_hold_the_truth(leg, slipping, tmp_path):
     model = identify(leg, slipping)
     springs = {spring.joint: spring for spring in model.springs}
@@ -148,12 +150,14 @@ def test_a_spring_that_lacks_something_says_so_and_its_intervals_hold_the_truth(
     assert again.doubt() == knee.doubt()
 
 
+@pytest.mark.scenario
 def test_one_shot_counts_it_too(leg, slipping):
     knee = next(spring for spring in identify_one_shot(leg, slipping).springs if spring.joint == "knee")
     assert knee.doubt() is not None
     assert knee.stiffness_std >= np.sqrt(np.array(knee.misfit)[0, 0])
 
 
+@pytest.mark.scenario
 def test_with_the_effect_nothing_is_left(leg, slipping):
     effects = (*identify(leg, slipping).effects, make_effect("spring_hysteresis", "knee", slip=0.004))
     model = identify(leg, slipping, effects=effects)

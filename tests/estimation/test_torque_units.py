@@ -39,11 +39,13 @@ def found(recorded, joint, factor):
         return other_torque_units(model, sea_ident.process(scaled(recording, joint, factor), leg, period=PERIOD))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("factor", [1.0, -1.0, 1.3, 2.0, 30.0])
 def test_what_is_no_unit_is_not_called_one(recorded, factor):
     assert found(recorded, "knee", factor) == ()
 
 
+@pytest.mark.scenario
 def test_a_torque_of_another_course_is_no_unit(recorded):
     """A thousand times that of the model, and far more that has nothing to do with it."""
     leg, model, recording = recorded
@@ -55,6 +57,7 @@ def test_a_torque_of_another_course_is_no_unit(recorded):
         assert other_torque_units(model, sea_ident.process(disturbed, leg, period=PERIOD)) == ()
 
 
+@pytest.mark.scenario
 def test_thousandths_and_a_torque_before_the_gear_are_recognised(recorded):
     (text,) = found(recorded, "knee", 1000.0)
     assert "'knee'" in text

@@ -47,6 +47,7 @@ def models(leg, recorded):
     return mean, replace(mean, trends=(term,)), processed, level
 
 
+@pytest.mark.scenario
 def test_a_model_predicts_what_drifts_beside_its_mean(models):
     mean, whole, processed, level = models
     motion = replace(processed.motion, time=processed.motion.time + 40.0)
@@ -60,6 +61,7 @@ def test_a_model_predicts_what_drifts_beside_its_mean(models):
     np.testing.assert_allclose(whole.predict_std(motion), np.sqrt(variance), rtol=1e-9)
 
 
+@pytest.mark.scenario
 def test_the_friction_of_the_mean_and_what_drifts_are_that_of_the_beginning(leg, models):
     """None was known of the other: the mean from `identify`, the drift from what was planted."""
     mean, whole, _, level = models
@@ -75,6 +77,7 @@ def test_the_friction_of_the_mean_and_what_drifts_are_that_of_the_beginning(leg,
     assert "trend friction_drift at knee: knee.friction_drift_viscous 0 +- 0.01 N m s/rad/min" in whole.summary()
 
 
+@pytest.mark.scenario
 def test_validation_follows_what_drifts_from_period_to_period(models):
     mean, whole, processed, _ = models
     torque, each = trend_torques(whole.robot, whole.effects, whole.trends, processed)
@@ -87,6 +90,7 @@ def test_validation_follows_what_drifts_from_period_to_period(models):
     np.testing.assert_allclose(each.mean(axis=0), torque, atol=1e-12)
 
 
+@pytest.mark.scenario
 def test_one_stretch_is_followed_sample_by_sample(models):
     _, whole, processed, _ = models
     later = replace(processed.motion, time=processed.motion.time + 100.0)
@@ -98,6 +102,7 @@ def test_one_stretch_is_followed_sample_by_sample(models):
     )
 
 
+@pytest.mark.scenario
 def test_a_simulated_model_drifts_as_the_robot_did(leg, models):
     _, whole, processed, level = models
     built = plant_from_identified(whole)
@@ -120,6 +125,7 @@ def test_a_simulated_model_drifts_as_the_robot_did(leg, models):
         np.testing.assert_allclose(beyond, gone, rtol=0.05)
 
 
+@pytest.mark.scenario
 def test_it_is_in_the_file_of_a_model_and_named_where_another_file_has_no_place_for_it(models, tmp_path):
     mean, whole, _, _ = models
     whole.save(tmp_path / "model.json")
@@ -141,6 +147,7 @@ def test_it_is_in_the_file_of_a_model_and_named_where_another_file_has_no_place_
             read_model(tmp_path / "other.json")
 
 
+@pytest.mark.scenario
 def test_without_a_temperature_friction_is_that_of_its_reference(models):
     mean, _, processed, _ = models
     warm = TrendTerm(make_effect("temperature_friction", "knee", reference=31.0, rise=0.0), (0.0, 0.1), (0.0, 0.0))
@@ -156,6 +163,7 @@ def test_without_a_temperature_friction_is_that_of_its_reference(models):
     np.testing.assert_allclose(beyond[:, KNEE], 0.2 * np.mean(each, axis=0), atol=1e-12)
 
 
+@pytest.mark.scenario
 def test_a_spring_that_softens_is_no_torque_of_the_motor(models):
     """It cancels in the sum of link and motor, and so it does in every prediction."""
     mean, _, processed, _ = models

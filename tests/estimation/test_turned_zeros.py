@@ -67,6 +67,7 @@ def processed_of(which, recording):
         return process(recording, which, period=5.0)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     "turned",
     [

@@ -62,6 +62,7 @@ def with_holes(recording):
     return Recording(recording.time[keep], columns, "holes")
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("change", [lambda whole: whole, with_holes], ids=["whole", "with holes"])
 def test_inertias_of_rotors_and_springs_lie_within_their_deviations(arm, recording, change):
     model = identify(arm, change(recording))

@@ -15,6 +15,7 @@ def small_series(n, harmonics=4, size=0.3, base_frequency=0.2):
     return FourierSeries.from_coefficients(coefficients, base_frequency)
 
 
+@pytest.mark.scenario
 def test_links_go_where_a_simulation_takes_them():
     """The motors of a simulation are not quite where they should be, so that theirs are followed."""
     arm = soft_arm()

@@ -46,6 +46,7 @@ def test_limits_of_a_soft_arm_hold_in_simulation(arm, kept):
     assert np.abs(broken.motion.ddq).max() > 3.0 * limits.acceleration.max()
 
 
+@pytest.mark.scenario
 def test_margins_told_are_those_of_links_and_motors(arm, kept):
     assert min(kept.margins.values()) >= 0.0
     response = elastic_response(Springs.of(arm), kept.series)
@@ -95,6 +96,7 @@ def test_links_that_sag_are_told_and_kept_where_that_is_asked_for(robot_of, tmp_
     assert spare.log_det < inside.log_det
 
 
+@pytest.mark.scenario
 def test_links_that_would_leave_a_limit_far_are_kept_inside():
     """The harmonics stay away from the resonance, but the elbow would be accelerated half as much again."""
     arm = soft_arm(260.0)
@@ -110,6 +112,7 @@ def test_links_that_would_leave_a_limit_far_are_kept_inside():
     assert planned.log_det - 3.0 < found.log_det < planned.log_det
 
 
+@pytest.mark.scenario
 def test_links_that_a_controller_moves_as_planned_are_not_asked_where_springs_take_them(arm):
     """The design is that for theta = q, also where links would swing, and nothing is said of springs."""
     planned = design_excitation(arm, links=LinksAsPlanned(), **SMALL)
@@ -119,6 +122,7 @@ def test_links_that_a_controller_moves_as_planned_are_not_asked_where_springs_ta
     assert planned.warnings == ()
 
 
+@pytest.mark.scenario
 def test_links_that_cannot_be_kept_inside_are_said(arm):
     """At rest already the first spring lets its link sag by more than is left of the range."""
     with pytest.warns(SeaIdentWarning, match=r"no trajectory was found .* shoulder.position by .* Take wider limits"):

@@ -116,6 +116,7 @@ def smallest(model, geometry, q):
     return least
 
 
+@pytest.mark.scenario
 def test_design_keeps_clear_at_all_times(crowded):
     """On a grid fifty times finer than the samples, with Pinocchio's kinematics, geometry and distances."""
     robot, _, free, kept = crowded
@@ -136,6 +137,7 @@ def test_design_keeps_clear_at_all_times(crowded):
     assert smallest(model, geometry, free.series.evaluate(time[::100])).min() <= 0.0
 
 
+@pytest.mark.scenario
 def test_meshes_are_no_nearer_than_their_hulls(crowded):
     robot, _, _, kept = crowded
     pairs = watched(kept)
@@ -144,6 +146,7 @@ def test_meshes_are_no_nearer_than_their_hulls(crowded):
     assert np.all(least >= np.array(list(pairs.values())))
 
 
+@pytest.mark.scenario
 def test_points_stay_on_their_side_at_all_times(crowded):
     _, _, free, kept = crowded
     model = pin.buildModelFromUrdf(str(example_robots_folder() / UR10))
@@ -165,6 +168,7 @@ def test_points_stay_on_their_side_at_all_times(crowded):
     assert kept.limits["table (ee_link)"] == (-np.inf, -0.1)  # the normal had length 2
 
 
+@pytest.mark.scenario
 def test_result_says_it_all(crowded, tmp_path):
     kept = crowded[3]
     text = kept.summary()

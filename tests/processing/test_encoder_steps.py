@@ -41,6 +41,7 @@ def steps_in(stack):
     return encoder_steps(values, values, stack, stack, MOTOR)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("rate", [250, 4000])
 @pytest.mark.parametrize("bits", [10, 12, 14])

@@ -44,6 +44,7 @@ def with_rest(motion, before, after, step=0.0, creep=0.0):
     return Recording(time, columns, "rested")
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("pauses", [(0.0, 14.0), (2.0, 14.0), (14.0, 0.0), (2.0, 4.0)], ids=str)
 @pytest.mark.parametrize(("step", "creep"), [(0.0, 0.0), (1.5e-3, 0.0), (0.0, 0.02)])
 def test_rest_hides_no_period_and_is_in_none(leg, truth, motion, pauses, step, creep):

@@ -33,6 +33,7 @@ def test_structures_tables_and_integers(tmp_path):
     assert list(again.columns) == ["current_cur"]
 
 
+@pytest.mark.scenario
 def test_cells_and_objects_are_never_interpreted(tmp_path):
     cell = np.array([TIME, "text"], dtype=object)
     scipy.io.savemat(tmp_path / "x.mat", {"time": TIME, "q_hip": TIME, "extra": cell, "s": {"c": cell}})

@@ -64,6 +64,7 @@ def test_a_bag_folder_that_exists_is_never_touched(tmp_path):
     assert read_recording(tmp_path / "leg").samples == 10
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("suffix", [".csv", ".mcap"])
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(tmp_path, suffix):
     path = tmp_path / f"leg{suffix}"

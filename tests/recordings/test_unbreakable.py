@@ -48,6 +48,7 @@ def outcome(path, **options):
     return "read"
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("suffix", [suffix for suffix in SUFFIXES if suffix not in ISOLATED])
 @settings(deadline=None, max_examples=60)
 @given(data=st.binary(max_size=600), with_magic=st.booleans())
@@ -91,6 +92,7 @@ def test_damaged_files(tmp_path, suffix):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kB
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("suffix", ISOLATED)
 def test_damaged_files_of_libraries_that_crash(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"

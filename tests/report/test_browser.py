@@ -83,10 +83,12 @@ def probed(leg_model, tmp_path_factory):
     return json.loads(found[1].replace("&quot;", '"').replace("&amp;", "&")), console, text
 
 
+@pytest.mark.scenario
 def test_nothing_is_written_to_the_console(probed):
     assert probed[1] == []
 
 
+@pytest.mark.scenario
 def test_every_section_and_chart_is_laid_out(probed):
     probe, _, text = probed
     assert len(probe["heights"]) == text.count("<section")
@@ -95,6 +97,7 @@ def test_every_section_and_chart_is_laid_out(probed):
     assert probe["overflow"] <= 0
 
 
+@pytest.mark.scenario
 def test_the_viewer_draws_moves_and_turns(probed):
     probe = probed[0]
     assert probe["colours"] > 20
@@ -102,6 +105,7 @@ def test_the_viewer_draws_moves_and_turns(probed):
     assert probe["turned"]
 
 
+@pytest.mark.scenario
 def test_dragging_zooms_all_linked_charts_and_a_double_click_undoes_it(probed):
     probe = probed[0]
     assert all(a != b for a, b in zip(probe["unzoomed"], probe["zoomed"], strict=True))
@@ -114,11 +118,13 @@ def test_dragging_zooms_all_linked_charts_and_a_double_click_undoes_it(probed):
         assert [float(v) for v in view.split()] == pytest.approx([0, 0, 10_000, 10_000], abs=1e-6)
 
 
+@pytest.mark.scenario
 def test_the_tip_names_each_line(probed):
     assert "measured" in probed[0]["tip"]
     assert "model" in probed[0]["tip"]
 
 
+@pytest.mark.scenario
 def test_dark_and_print_have_colours_of_their_own(leg_model, tmp_path):
     write_report(leg_model, tmp_path / "report.html")
     script = "<script>document.body.dataset.paper = getComputedStyle(document.body).backgroundColor;</script></body>"

@@ -103,6 +103,7 @@ def test_a_model_keeps_its_gravity(tmp_path):
     assert 'gravity="0.0 9.81 0.0"' in (tmp_path / "out.xml").read_text()
 
 
+@pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 @pytest.mark.parametrize("gravity", [(0.0, 9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 6.94, -6.94)])
 def test_a_robot_on_a_wall_is_told_from_one_that_stands(gravity):

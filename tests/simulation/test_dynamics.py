@@ -107,6 +107,7 @@ def test_error_falls_with_a_power_of_the_step(leg, leg_series, quiet, exact, law
     assert errors[0] < 3e-5
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("error", [0.5, -0.5])
 def test_the_order_stays_where_a_motor_is_asked_for_another_torque(leg, leg_series, quiet, exact, error):
     planted = [PlantedEffect(make_effect("torque_constant", name), np.array([error])) for name in leg.joint_names]
@@ -186,6 +187,7 @@ def test_angular_momentum_about_a_free_vertical_axis_is_kept(quiet):
     np.testing.assert_allclose(momentum, momentum[0], rtol=2e-6)
 
 
+@pytest.mark.scenario
 def test_stiff_friction_and_light_links_stay_stable_at_the_default_step(quiet):
     robot = baxter_arm()
     simulation = simulate(

@@ -65,6 +65,7 @@ def test_spring_effects_are_part_of_the_spring_torque(leg, leg_series, quiet, ex
     np.testing.assert_allclose(run.tau_spring - law, np.tile([2.0, 0.0, 0.0], (len(d), 1)), atol=1e-10)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("loaded", [["elbow_joint"], ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint"]])
 def test_load_of_a_rigid_joint_is_what_its_bodies_need(quiet, loaded):
     robot = ur10()
@@ -122,6 +123,7 @@ BENT_SPRING = [("spring_stiffening", [90.0], {"exponent": 2.0}), ("asymmetric_sp
 AT_MOTOR = [("torque_offset", [0.7], {}), ("stribeck_friction", [0.5], {}), ("directional_efficiency", [0.08], {})]
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "value", "others"),
     [
@@ -145,6 +147,7 @@ def test_what_follows_a_load_follows_all_that_the_model_has_there(leg, leg_serie
     assert np.abs(build_regressor(leg, without, run.motion).motor @ psi - run.tau_motor).max() > 1e-3
 
 
+@pytest.mark.scenario
 def test_what_follows_the_load_of_a_rigid_joint_follows_all_that_the_joint_carries(quiet):
     robot = ur10()
     series = modest_series(robot)
@@ -335,6 +338,7 @@ class Sloped(Told):
         return action
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "values"),
     [

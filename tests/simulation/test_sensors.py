@@ -66,6 +66,7 @@ def test_spring_torque_and_temperature_only_where_there_are_such_sensors(leg, le
     np.testing.assert_allclose(heat, expected, rtol=1e-12)
 
 
+@pytest.mark.scenario
 def test_torque_variance_over_periods_peaks_at_velocity_reversal(leg, leg_series):
     # Paper, fig. 1(b). Noise of the sensors is left out: what is seen is the friction.
     run = simulate(leg, leg_series, periods=16, sensors=SensorNoise.none(), seed=2)

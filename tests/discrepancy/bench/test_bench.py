@@ -22,6 +22,7 @@ def pushed(laboratory):
     return bench, settle(bench, bench.effects)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("x", "z"), [(0.2, -0.5), (-0.2, -0.5), (0.3, 0.2)])
 def test_a_shape_at_the_end_of_its_range_does_not_hold_up_the_others(pushed, x, z):
     """However it begins: where the fit ends, no shape that can move brings the statistic down."""
@@ -113,6 +114,7 @@ def test_friction_that_turns_over_out_of_sight_is_brought_where_samples_tell_of_
     assert turning_in_sight((friction, loss, link), slowest) == (friction, loss, link)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("joint", ["knee", "ankle"])
 def test_friction_that_turned_over_out_of_sight_comes_back(laboratory, joint):
     """From a turn that no sample tells from a sharper one, the fit ends where it does from anywhere else."""

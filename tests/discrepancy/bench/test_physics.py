@@ -256,6 +256,7 @@ def test_a_small_part_of_the_wrong_sign_is_excused_while_others_are_missing(labo
     assert possible(bench, fit, start.noise, -1)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("times", "accepted"), [(0.9, True), (1.1, False)])
 def test_no_effect_is_much_larger_than_what_is_there_and_what_the_bodies_weigh(prosthesis, times, accepted):
     """A constant torque that bears the leg leaves its motor hardly any."""

@@ -31,6 +31,7 @@ def off(now):
     return (now.fit.values[last] - SATURATION) / now.fit.std(last)
 
 
+@pytest.mark.scenario
 def test_effects_are_followed_until_they_stand_where_the_model_puts_them(saturated):
     bench, start = saturated
     begun = Settled(fit := with_saturation(bench, start), bench.noise(fit))
@@ -53,6 +54,7 @@ def test_a_search_ends_with_effects_that_stand(saturated):
     assert anchored_in_itself(bench, found.final) is found.final
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("followed", "true", "beside"),
     [
@@ -81,6 +83,7 @@ def test_what_depends_on_nothing_stays_as_it_is(nothing_missing):
     assert anchored_in_itself(bench, now) is now
 
 
+@pytest.mark.scenario
 def test_a_model_that_lacks_more_is_left_alone(saturated):
     """Its sizes are wrong by what it lacks, and rounds would be lost."""
     bench, start = saturated

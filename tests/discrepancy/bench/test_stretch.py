@@ -35,12 +35,14 @@ def cogging(laboratory):
     return bench, bench.fit(bench.effects, None, tangents=False)
 
 
+@pytest.mark.scenario
 def test_what_is_left_is_the_noise_and_never_too_large(clean, cogging):
     for bench, fit in (clean, cogging):
         again = bench.fit(fit.effects, bench.noise(fit), start=fit.parameters)
         assert 0.3 < again.statistic / again.dof < 1.15
 
 
+@pytest.mark.scenario
 def test_the_residual_in_time_is_what_the_equations_of_a_joint_sum_up_to(clean):
     bench, fit = clean
     whole = spectrum(full_residual(bench, fit), bench.data.harmonics)
@@ -49,6 +51,7 @@ def test_the_residual_in_time_is_what_the_equations_of_a_joint_sum_up_to(clean):
         np.testing.assert_allclose(whole[:, i], fit.residual[:, own].sum(axis=1), atol=1e-9)
 
 
+@pytest.mark.scenario
 def test_an_effect_that_is_there_predicts_blocks_that_were_not_used(cogging):
     bench, fit = cogging
     noise = bench.noise(fit)
@@ -59,6 +62,7 @@ def test_an_effect_that_is_there_predicts_blocks_that_were_not_used(cogging):
     assert with_it.sum() < 0.8 * without.sum()
 
 
+@pytest.mark.scenario
 def test_an_effect_that_is_not_there_predicts_no_better(clean):
     bench, fit = clean
     noise = bench.noise(fit)
@@ -69,6 +73,7 @@ def test_an_effect_that_is_not_there_predicts_no_better(clean):
     assert np.count_nonzero(with_it < without) < 10
 
 
+@pytest.mark.scenario
 def test_every_block_counts_what_is_in_it(clean):
     """A torque that the model does not have, in one block alone."""
     bench, fit = clean

@@ -52,6 +52,7 @@ def decided(rivals, own, alternative, *, dearer=False, behind=0.0):
     return selection.effects[0].name, [a.effect for a in left[position]], held
 
 
+@pytest.mark.scenario
 def test_what_holds_on_the_other_motion_is_taken(rivals):
     name, left, held = decided(rivals, "spring_hysteresis", "spring_offset")
     assert (name, left) == ("spring_offset", [])
@@ -59,11 +60,13 @@ def test_what_holds_on_the_other_motion_is_taken(rivals):
     assert held.transfers[0].share > 0.9
 
 
+@pytest.mark.scenario
 def test_what_does_not_hold_on_the_other_motion_is_ruled_out(rivals):
     name, left, _ = decided(rivals, "spring_offset", "spring_hysteresis")
     assert (name, left) == ("spring_offset", [])
 
 
+@pytest.mark.scenario
 def test_what_does_the_same_on_the_other_motion_is_worth_the_same(rivals):
     """Friction of a spring that only holds it aside is an offset: each in its own noise floor, they seem 20 apart."""
     _, other, start, fits = rivals
@@ -76,11 +79,13 @@ def test_what_does_the_same_on_the_other_motion_is_worth_the_same(rivals):
         assert held.worth(chosen[own], position).statistic == pytest.approx(held.transfers[0].statistic, abs=1e-6)
 
 
+@pytest.mark.scenario
 def test_what_takes_more_parameters_is_taken_where_the_other_motion_asks_for_it_only(rivals):
     assert decided(rivals, "spring_hysteresis", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
     assert decided(rivals, "spring_offset", "spring_offset", dearer=True)[:2] == ("spring_offset", [])
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("behind", "name", "left"),
     [
@@ -125,6 +130,7 @@ def test_both_motions_together_decide_about_what_is_a_little_behind(rivals, behi
     assert all(a.as_likely for a in alternatives[position])
 
 
+@pytest.mark.scenario
 def test_what_holds_on_the_other_motion_has_nothing_to_fear_from_it(rivals):
     assert decided(rivals, "spring_offset", "spring_hysteresis", behind=20.0)[:2] == ("spring_offset", [])
 
@@ -147,6 +153,7 @@ def test_the_same_motion_again_decides_between_no_equals(rivals, laboratory, mon
     assert held.kind is Kind.SAME_MOTION
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("beyond", [True, False])
 def test_what_the_library_lacks_is_given_no_other_name_by_another_motion(rivals, monkeypatch, beyond):
     """Whatever of its equals it is called, most stays unexplained: that the nearest does not hold changes nothing."""
@@ -167,6 +174,7 @@ def test_what_the_library_lacks_is_given_no_other_name_by_another_motion(rivals,
     assert bool(weighed) is not beyond
 
 
+@pytest.mark.scenario
 def test_what_holds_there_as_well_stays_possible(rivals):
     name, left, _ = decided(rivals, "spring_offset", "spring_offset")
     assert (name, left) == ("spring_offset", ["spring_offset"])
@@ -231,6 +239,7 @@ def constant_or_wave(laboratory):
     return bench, start, constant, wave
 
 
+@pytest.mark.scenario
 def test_what_another_effect_leaves_speaks_for_no_wave(constant_or_wave):
     bench, start, constant, wave = constant_or_wave
     selection = Selection(start, Settled(wave, start.noise), 1, (1e-9,))
@@ -238,6 +247,7 @@ def test_what_another_effect_leaves_speaks_for_no_wave(constant_or_wave):
     assert simplest_first(bench, selection, listed)[0].effects[0].name == "torque_offset"
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("first", ["torque_offset", "torque_ripple"])
 def test_nor_in_a_search_whichever_is_tried_first(constant_or_wave, first):
     bench, start, *_ = constant_or_wave
@@ -248,6 +258,7 @@ def test_nor_in_a_search_whichever_is_tried_first(constant_or_wave, first):
     assert fit.effects[-1].name == "torque_offset"
 
 
+@pytest.mark.scenario
 def test_nor_in_an_exchange(constant_or_wave):
     bench, start, _, wave = constant_or_wave
     everything = {c.key for c in scan(bench, start.fit, start.noise)}
@@ -256,12 +267,14 @@ def test_nor_in_an_exchange(constant_or_wave):
     assert after.fit.effects[-1].name == "torque_offset"
 
 
+@pytest.mark.scenario
 def test_what_is_ruled_out_takes_the_place_of_nothing(constant_or_wave):
     bench, start, _, wave = constant_or_wave
     now = Settled(wave, start.noise)
     assert exchange(bench, now, 1, {}, {c.key for c in scan(bench, start.fit, start.noise)}) is now
 
 
+@pytest.mark.scenario
 def test_what_is_in_the_model_is_no_alternative_to_another_part_of_it(rivals):
     bench, other, start, _ = rivals
     position = len(start.fit.effects)

@@ -28,6 +28,7 @@ def with_ripple(laboratory):
     return laboratory.record([("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})], periods=5, motion=1, seed=8)
 
 
+@pytest.mark.scenario
 def test_every_other_period_is_held_out(ripple):
     bench, selection = ripple
     found = other_periods(bench, selection)
@@ -41,6 +42,7 @@ def test_every_other_period_is_held_out(ripple):
     assert found.transfers[0].share == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.scenario
 def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     found, warnings = held_out(*ripple, with_ripple)
     assert warnings == ()
@@ -59,6 +61,7 @@ def test_a_real_effect_holds_on_another_motion(ripple, with_ripple):
     assert power[1] < 0.3 * power[0]
 
 
+@pytest.mark.scenario
 def test_what_foretells_the_same_of_another_motion_is_told_apart_by_nothing_there(ripple, with_ripple):
     """A constant in a spring and another zero of its encoder: the same torque, but for what the link weighs there."""
     bench, selection = ripple
@@ -78,6 +81,7 @@ def test_what_foretells_the_same_of_another_motion_is_told_apart_by_nothing_ther
     assert not found.foretell_the_same(springs[1e-5][0], selection)
 
 
+@pytest.mark.scenario
 def test_nothing_is_tested_on_a_torque_of_the_wrong_sign(ripple, with_ripple):
     kind = "current_ankle"
     found, said = held_out(*ripple, with_ripple.replace_columns({kind: -with_ripple.columns[kind]}))
@@ -86,6 +90,7 @@ def test_nothing_is_tested_on_a_torque_of_the_wrong_sign(ripple, with_ripple):
     assert any("cannot be used; nothing was tested on it" in text for text in said)
 
 
+@pytest.mark.scenario
 @pytest.mark.filterwarnings("ignore::sea_ident.exceptions.SeaIdentWarning")
 def test_rest_after_either_recording_is_in_nothing_that_is_looked_at(leg, laboratory, ripple, with_ripple, monkeypatch):
     """What is read beside the periods is read from the same part of a recording: its end is theirs."""
@@ -123,6 +128,7 @@ def test_what_one_of_several_effects_is_worth_is_what_it_is_among_all(laboratory
     assert found.transfers[0] != found.transfers[1]
 
 
+@pytest.mark.scenario
 def test_what_an_effect_is_worth_does_not_depend_on_what_was_tried_before(laboratory, ripple, with_ripple):
     """A torque that comes late jumps after the motor turned back: these samples are left out for it alone."""
     bench, selection = ripple
@@ -140,6 +146,7 @@ def test_what_an_effect_is_worth_does_not_depend_on_what_was_tried_before(labora
     assert apart.freed(None).count > compared == found.bench.freed(None).count
 
 
+@pytest.mark.scenario
 def test_what_is_far_behind_another_is_ruled_out_without_a_fit(ripple, with_ripple, monkeypatch):
     """And a fit would rule it out as well; what is not far behind is fitted, as if nothing stood beside it."""
     bench, selection = ripple
@@ -187,6 +194,7 @@ def test_the_same_motion_again_is_no_other_motion(laboratory, ripple):
         assert found.again(ripple[1]).kind is Kind.SAME_MOTION
 
 
+@pytest.mark.scenario
 def test_an_effect_that_is_not_there_does_not_hold(laboratory, ripple):
     """The other motion was recorded without it: with its parameters as they are, it makes things worse."""
     (transfer,) = held_out(*ripple, laboratory.record(periods=5, motion=1, seed=8))[0].transfers
@@ -207,6 +215,7 @@ def test_nothing_was_added_and_nothing_is_held_out(nothing_missing):
     assert held_out(bench, Selection(now, now, 0, ()), None) == (None, ())
 
 
+@pytest.mark.scenario
 def test_five_periods_are_not_split(laboratory, ripple):
     whole = laboratory.record()
     bench = laboratory.bench(whole.crop(float(whole.time[0]), float(whole.time[0]) + 5 * 5.0))
@@ -215,12 +224,14 @@ def test_five_periods_are_not_split(laboratory, ripple):
     assert other_periods(bench, Selection(now, now, 1, (1e-9,))) is None
 
 
+@pytest.mark.scenario
 def test_one_pass_tests_nothing_and_it_is_said(laboratory, ripple):
     found, warnings = held_out(*ripple, laboratory.record(periods=1, motion=1))
     assert found.kind is Kind.OTHER_PERIODS
     assert "less than two periods" in warnings[0]
 
 
+@pytest.mark.scenario
 def test_a_constant_torque_of_a_spring_that_remembers_does_not_count(ripple):
     bench, selection = ripple
     fit = bench.predicted(selection.start.fit.effects, selection.start.fit.parameters)
@@ -236,6 +247,7 @@ def test_a_constant_torque_of_a_spring_that_remembers_does_not_count(ripple):
     assert abs(np.vdot(constant[0], cleaned[0])) < 1e-9
 
 
+@pytest.mark.scenario
 def test_that_constant_is_left_out_for_springs_with_dry_friction_alone(ripple):
     bench, selection = ripple
     start = selection.start.fit

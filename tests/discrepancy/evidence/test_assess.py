@@ -185,6 +185,7 @@ def test_what_the_model_takes_up_but_for_a_trace_elsewhere_is_an_alternative():
     assert ("torque_offset", "j3") in {(a.effect, a.joint) for a in found}
 
 
+@pytest.mark.scenario
 def test_what_is_shorter_than_is_compared_is_no_rival(preloaded, monkeypatch):
     """As a push that never pauses, which is a constant by the name of a push."""
     bench, _, selection = preloaded
@@ -200,6 +201,7 @@ def test_what_is_shorter_than_is_compared_is_no_rival(preloaded, monkeypatch):
     assert "asymmetric_spring" not in {a.effect for others in found.values() for a in others}
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("effect", SAME_TORQUE, ids=lambda e: f"{e.name} {getattr(e, 'kink', '')}")
 def test_a_transfer_is_the_same_however_the_same_torque_is_written(preloaded, effect):
     """A kink takes a part of the stiffness along: that part is there too where the effect is held."""
@@ -214,6 +216,7 @@ def test_a_transfer_is_the_same_however_the_same_torque_is_written(preloaded, ef
     assert found[1].holds
 
 
+@pytest.mark.scenario
 def test_a_width_that_the_motion_leaves_open_is_no_reason_to_rule_play_out(preloaded):
     bench, other, selection = preloaded
     first = len(selection.start.fit.effects)
@@ -229,6 +232,7 @@ def test_a_width_that_the_motion_leaves_open_is_no_reason_to_rule_play_out(prelo
     assert width < np.min(other.data.motion.deflection[:, 0]) * 1.5
 
 
+@pytest.mark.scenario
 def test_of_equals_the_simplest_is_named(preloaded):
     bench, _, selection = preloaded
     first = len(selection.start.fit.effects)
@@ -247,6 +251,7 @@ def test_of_equals_the_simplest_is_named(preloaded):
     assert simplest_first(bench, kinked, worse)[0] is kinked
 
 
+@pytest.mark.scenario
 def test_more_parameters_are_no_alternative_unless_another_motion_asks_for_them(preloaded):
     bench, other, selection = preloaded
     first = len(selection.start.fit.effects)
@@ -257,6 +262,7 @@ def test_more_parameters_are_no_alternative_unless_another_motion_asks_for_them(
     assert left[first] == ()
 
 
+@pytest.mark.scenario
 def test_a_shape_that_the_first_motion_leaves_open_is_taken_as_the_other_has_it(preloaded):
     bench, other, selection = preloaded
     first = len(selection.start.fit.effects)

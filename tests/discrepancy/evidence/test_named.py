@@ -22,6 +22,7 @@ from sea_ident.effects import make_effect
 from sea_ident.simulation import FrictionJitter
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("share", "known"), [(0.1, True), (0.6, False)])
 def test_where_dry_friction_in_a_spring_slips_shows_only_where_it_does(laboratory, nothing_missing, share, known):
     """What sticks all the time is a spring and a constant, whatever it would slip at."""
@@ -40,6 +41,7 @@ def test_where_dry_friction_in_a_spring_slips_shows_only_where_it_does(laborator
     assert known or all(unsure.values())
 
 
+@pytest.mark.scenario
 def test_the_power_that_a_search_tried_is_told_with_what_is_known_of_it(laboratory, nothing_missing):
     """A spring that stiffens by a power of 2.015, fitted with 2: as sure of its size as of its power."""
     _, start = nothing_missing
@@ -89,6 +91,7 @@ def test_what_columns_have_in_common_is_told_of_none_of_them():
         assert not off.any()
 
 
+@pytest.mark.scenario
 def test_a_torque_constant_may_have_been_as_described_before_it_drifted_or_in_the_mean(laboratory, monkeypatch):
     """Nothing in the model takes up what it is off by in the mean, so a loss by load does."""
     planted = [("directional_efficiency", "hip", [0.2], {}), ("torque_constant_drift", "hip", [0.06], {})]

@@ -103,6 +103,7 @@ def test_what_a_model_leaves_makes_it_less_sure(rippled, monkeypatch):
     np.testing.assert_allclose(told, ratio**0.5 * np.linalg.norm(fit.covariance_factor, axis=1))
 
 
+@pytest.mark.scenario
 def test_along_a_shape_that_is_hardly_known_values_are_as_unsure_as_they_go(laboratory, monkeypatch):
     """Friction that hardly varies over the turn of a joint fits with any order, and with amounts that follow it."""
     planted = {"sine": 0.2, "cosine": -0.15, "order": 1.0}
@@ -173,6 +174,7 @@ def test_what_looks_like_a_column_is_that_parameter_and_no_more(nothing_missing,
     assert np.all(shift[friction] < 1e-6)
 
 
+@pytest.mark.scenario
 def test_a_push_whose_end_is_off_by_most_of_a_sample_is_told_as_unsure_as_it_is_off(laboratory):
     push, force = make_effect("external_force", "knee", start=1.0, stop=1.1, period=PERIOD), np.array([40.0, 0.0, 0.0])
     bench = laboratory.bench(laboratory.record([(push, force)], periods=12, jitter=FrictionJitter.none()))

@@ -44,6 +44,7 @@ def zeros(constant):
     return named_effects(bench, Selection(start, now, 1, (0.0,)), {}, None)
 
 
+@pytest.mark.scenario
 def test_to_first_order_it_is_what_a_fit_beside_it_says(constant):
     bench, _, now = constant
     effect = make_effect("encoder_offset", "knee")
@@ -58,6 +59,7 @@ def test_to_first_order_it_is_what_a_fit_beside_it_says(constant):
     assert found.shift[own] == pytest.approx(whole.values[own] - now.fit.values[own], rel=0.05)
 
 
+@pytest.mark.scenario
 def test_an_effect_that_fits_better_beside_what_has_no_name_is_known_no_better_than_that(constant, zeros):
     """The constant alone is half of what it is, ten of the standard deviations that it has alone."""
     now = constant[-1]
@@ -69,6 +71,7 @@ def test_an_effect_that_fits_better_beside_what_has_no_name_is_known_no_better_t
     assert abs(told.value - CONSTANT) < 2.0 * told.std
 
 
+@pytest.mark.scenario
 def test_what_is_worth_nothing_does_not_make_an_effect_less_known(laboratory):
     bench = laboratory.bench(laboratory.record([("spring_offset", "knee", [CONSTANT], {})], periods=12))
     start = settle(bench, bench.effects)
@@ -84,6 +87,7 @@ def test_what_is_worth_nothing_does_not_make_an_effect_less_known(laboratory):
     assert beside.std > WIDER * told.std
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("dearer", "covered"), [(False, True), (True, False)])
 def test_what_depends_on_what_another_effect_is_covers_all_that_it_may_be(laboratory, dearer, covered):
     """A constant at the motor is one in the spring and one on the link: a preload there is told as of one of them."""

@@ -61,6 +61,7 @@ def test_time_that_is_not_in_seconds_is_refused(rate):
         clock_in_seconds(Recording(1e3 * time, columns, "a.csv"))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("seed", [3, 4, 6, 7])
 def test_no_torque_of_an_arm_without_friction_has_the_wrong_sign(seed):
     """Its motors take up work that others do, and noise of accelerations makes an inertia of any sign."""

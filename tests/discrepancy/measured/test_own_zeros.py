@@ -98,6 +98,7 @@ def test_a_constant_that_the_model_has_is_no_zero(laboratory, leg):
     assert np.count_nonzero([isinstance(e, SpringOffset) for e in effects]) == 1
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("kind", "own"), [(OwnZero, True), (SpringOffset, False)])
 def test_the_constant_of_a_zero_of_its_own_is_not_foretold(laboratory, kind, own):
     """That of a spring is: it is there on every motion."""

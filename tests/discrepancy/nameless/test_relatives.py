@@ -56,6 +56,7 @@ def ripple_found(laboratory):
     return bench, selection, *unnamed(bench, selection, None)
 
 
+@pytest.mark.scenario
 def test_a_ripple_that_grows_with_the_load_is_not_a_ripple(ripple_found):
     bench, selection, one = ripple_found
     assert (one.effect, one.joint, one.relative) == ("torque_ripple", "hip", "growing with the load")
@@ -90,6 +91,7 @@ def test_what_one_leaves_need_not_stand_out_of_noise(nothing_missing, growth, co
         assert selection.final.fit.statistic - fit.statistic > EQUALLY_GOOD
 
 
+@pytest.mark.scenario
 def test_it_is_said_in_the_verdict_and_in_words(ripple_found):
     bench, selection, one = ripple_found
     confirmed = Confirmed(selection, bench, selection.start, selection.final)
@@ -104,6 +106,7 @@ def test_it_is_said_in_the_verdict_and_in_words(ripple_found):
     assert "The same as torque_ripple at hip, but growing with the load, leaves" in said[1].text
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("beats", [True, False])
 def test_two_waves_that_beat_are_one_that_grows_with_the_load(nothing_missing, beats):
     """Their lengths differ by less than the motion tells; two of lengths of their own are two."""

@@ -55,6 +55,7 @@ def test_an_error_once_per_turn_keeps_its_name(bench_with):
     assert unnamed(bench, found_in(bench, make_effect("encoder_eccentricity", "knee")), None) == ()
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("of_motor", [False, True])
 @pytest.mark.parametrize("joint", ["hip", "knee"])
 def test_what_is_shown_is_corrected(leg, series, joint, of_motor):

@@ -124,6 +124,7 @@ def drifted(request, leg, series):
     return request.param, recording, diagnosed(identified(leg, recording), recording, holdout=other)
 
 
+@pytest.mark.scenario
 def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, drifted):
     """Named, added, its gap gone here and on another motion; and true at the begin and at the end."""
     kind, _, found = drifted
@@ -142,6 +143,7 @@ def test_what_drifts_is_beside_the_mean_in_the_repaired_model(leg, drifted):
             assert abs(mean.value + change * term.values[1] - true - 3.0 * warming(time, 60.0)) < 3.0 * std
 
 
+@pytest.mark.scenario
 def test_another_motion_that_began_as_this_one_is_predicted_and_simulated_in_its_own_mean(drifted):
     """It is shorter: not all that the mean of the recording has of what drifts is there."""
     _, _, found = drifted
@@ -229,6 +231,7 @@ def test_friction_that_acts_only_beside_reversals_comes_from_the_diagnosis(leg, 
     assert both["hip.coulomb_friction"].std > 0.9 * alone["hip.coulomb_friction"].std
 
 
+@pytest.mark.scenario
 def test_presliding_takes_away_the_sign_that_the_model_has(laboratory):
     """It says nothing of the speed at which that turns over: where this stays as it was, both stay."""
     leg = laboratory.leg

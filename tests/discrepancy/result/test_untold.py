@@ -50,6 +50,7 @@ def as_sharp(fit, leg):
     return replace(fit, effects=tuple(known.get((e.name, e.joint), e) for e in fit.effects), free_shapes=())
 
 
+@pytest.mark.scenario
 def test_friction_that_the_motor_torques_do_not_split_is_split_in_the_repaired_model(rubbing, leg):
     model, processed, fit = rubbing
     with pytest.raises(IdentificationError, match="depend on each other"):
@@ -67,6 +68,7 @@ def test_friction_that_the_motor_torques_do_not_split_is_split_in_the_repaired_m
     assert repaired.estimator == model.estimator
 
 
+@pytest.mark.scenario
 def test_what_the_fit_does_not_tell_either_is_the_reason_that_there_is_no_model(rubbing, leg):
     model, processed, fit = rubbing
     names = [column.name for column in fit.columns]

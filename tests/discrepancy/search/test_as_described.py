@@ -46,6 +46,7 @@ def found_in(selection):
     return {(effect.name, effect.joint) for effect in selection.effects}
 
 
+@pytest.mark.scenario
 def test_friction_is_told_at_all_joints_at_once(rubbing):
     bench, start = rubbing
     fit = as_described(bench, start).fit
@@ -57,6 +58,7 @@ def test_friction_is_told_at_all_joints_at_once(rubbing):
             assert fit.values[k] == pytest.approx(value, abs=4.0 * fit.std(k) + 0.005 * value)
 
 
+@pytest.mark.scenario
 def test_a_search_names_it_and_nothing_else(rubbing, monkeypatch):
     bench, start = rubbing
     monkeypatch.setattr(searching, "next_effect", lambda *given: None)  # it is no discovery
@@ -66,6 +68,7 @@ def test_a_search_names_it_and_nothing_else(rubbing, monkeypatch):
     assert max(selection.p_values) < 1e-9
 
 
+@pytest.mark.scenario
 def test_what_a_description_gives_and_no_link_has_is_not_told(described, monkeypatch):
     bench, start = with_friction_at(described)
     monkeypatch.setattr(bench, "fit", None)  # nothing is missing, nothing is tried
@@ -73,6 +76,7 @@ def test_what_a_description_gives_and_no_link_has_is_not_told(described, monkeyp
     assert _as_described(bench, start) == (start, [])
 
 
+@pytest.mark.scenario
 def test_encoders_of_links_that_are_late_at_all_joints_are_no_friction_there(described):
     """The friction that is described fits nearly as well."""
     bench, start = with_friction_at(described, planted=[("position_delay", None, [], {"delay": 2e-4})])
@@ -85,11 +89,13 @@ def test_encoders_of_links_that_are_late_at_all_joints_are_no_friction_there(des
     assert now.fit.statistic < 1.1 * now.fit.dof < rubbing.statistic
 
 
+@pytest.mark.scenario
 def test_what_explains_little_is_not_where_a_search_begins(described):
     bench, start = with_friction_at(described, planted=[("torque_ripple", "hip", [1.0, 0.5], {"order": 4.0})])
     assert as_described(bench, start) is start
 
 
+@pytest.mark.scenario
 def test_what_the_model_has_is_not_added_again(described, rubbing):
     bench = described.bench(described.record(), (*described.effects, make_effect("link_friction", "hip")))
     now = as_described(bench, settle(bench, bench.effects))
@@ -97,6 +103,7 @@ def test_what_the_model_has_is_not_added_again(described, rubbing):
     assert sorted(found) == sorted(JOINTS)
 
 
+@pytest.mark.scenario
 def test_friction_stays_where_it_is_needed(described):
     bench, start = with_friction_at(described, "knee")
     now, p_values = _as_described(bench, start)
@@ -106,12 +113,14 @@ def test_friction_stays_where_it_is_needed(described):
     assert now.fit.statistic < 1.3 * now.fit.dof
 
 
+@pytest.mark.scenario
 def test_how_sure_it_is_follows_from_the_recording(described):
     bench, start = with_friction_at(described, "knee", share=0.006)
     _, (p_value,) = _as_described(bench, start)
     assert 0.0 < p_value < 1e-20
 
 
+@pytest.mark.scenario
 def test_a_model_that_has_it_is_as_it_was(described, rubbing):
     friction = [make_effect("link_friction", joint) for joint in JOINTS]
     bench = described.bench(described.record(), (*described.effects, *friction))
@@ -119,6 +128,7 @@ def test_a_model_that_has_it_is_as_it_was(described, rubbing):
     assert as_described(bench, start) is start
 
 
+@pytest.mark.scenario
 def test_what_stays_without_friction_of_links_begins_with_nothing(laboratory):
     bench = laboratory.bench(laboratory.record([("link_friction", "knee", [0.1, 0.15], {})]))
     start = settle(bench, bench.effects)

@@ -139,6 +139,7 @@ def test_of_shapes_that_do_the_same_the_smallest_is_taken_whatever_rounding_says
     assert list(_best_last(-np.ones(2), np.array([1.0, 2.0]), EXACTLY)) == [1, 0]
 
 
+@pytest.mark.scenario
 def test_a_wave_may_be_as_large_as_what_the_bodies_weigh(small_motions):
     """A ripple that cancels the weight leaves its motor a torque in which it is no modest part."""
     bench = small_motions.bench(

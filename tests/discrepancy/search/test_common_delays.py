@@ -34,6 +34,7 @@ def late(laboratory):
     return on_the_bench(laboratory, ("torque_delay", None, [], {"delay": 0.006}))
 
 
+@pytest.mark.scenario
 def test_one_delay_of_all_is_found(late, laboratory):
     """The right one of the two, and how long it is; nothing more is missing."""
     for name, delay, within, asked in (
@@ -56,6 +57,7 @@ def with_their_delays(bench, start, *joints):
     return settle_again(bench, bench.refine(effects, start.noise, start=start.fit.parameters, only=len(bench.effects)))
 
 
+@pytest.mark.scenario
 def test_the_delays_of_some_joints_are_theirs(laboratory):
     """Before a search and after it."""
     asked = on_the_bench(laboratory, *(("torque_delay", joint, [], {"delay": 0.006}) for joint in ("hip", "ankle")))
@@ -65,6 +67,7 @@ def test_the_delays_of_some_joints_are_theirs(laboratory):
     assert one_for_two(bench, now, 2) == (now, [0, 1])
 
 
+@pytest.mark.scenario
 def test_delays_that_were_found_one_by_one_are_one(late):
     """What stands between them stays."""
     bench, start, _ = late
@@ -81,6 +84,7 @@ def test_delays_that_were_found_one_by_one_are_one(late):
     assert one_for_two(bench, after, 2) == (after, [0, 1])
 
 
+@pytest.mark.scenario
 def test_a_search_asks_for_its_significance(late):
     bench, start, _ = late
     found = search(bench, bench.effects, start=start)
@@ -89,6 +93,7 @@ def test_a_search_asks_for_its_significance(late):
     assert 0.0 < p_value < FAMILY_LEVEL
 
 
+@pytest.mark.scenario
 def test_what_is_there_is_not_asked_for_again(late, monkeypatch):
     bench, start, _ = late
     asked = []
@@ -98,6 +103,7 @@ def test_what_is_there_is_not_asked_for_again(late, monkeypatch):
     assert [[effect.name for effect in kinds] for kinds in asked] == [["position_delay"]]
 
 
+@pytest.mark.scenario
 def test_it_is_not_asked_for_where_one_effect_explains_all(late, nothing_missing, monkeypatch):
     """Nor found where nothing is missing."""
     bench, start, candidates = late

@@ -110,6 +110,7 @@ def test_what_does_not_stand_out_of_the_scatter_of_the_passes_is_dropped(laborat
     assert torque_change(found.bench, fit, less) > 2.0 * SMALLEST_SHARE
 
 
+@pytest.mark.scenario
 def test_the_best_of_several_motors_stands_out_of_the_scatter_by_more_than_one_that_was_asked_for(laboratory):
     """By chance alone one of three does so three times as often."""
     friction = make_effect("nonlinear_viscous_friction", "ankle", exponent=0.4)
@@ -131,6 +132,7 @@ def test_what_holds_elsewhere_stays_with_its_size(rippled):
     assert found.start.fit.statistic / found.start.fit.dof > 3.0
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("hidden", [False, True])
 def test_what_hardly_shows_elsewhere_stays_where_another_takes_it_up(rippled, monkeypatch, hidden):
     bench, *_ = rippled
@@ -252,6 +254,7 @@ def test_a_search_tells_what_it_had_before_it_took_anything_out(rippled, monkeyp
     assert found.whole.effects[0].name == "torque_ripple"
 
 
+@pytest.mark.scenario
 def test_few_samples_in_a_period_leave_enough_to_confirm_by(laboratory):
     """At 20 Hz those beside the reversals of a motion of five seconds are most: there only what is slow counts."""
     bench = laboratory.bench(laboratory.record([("torque_offset", "knee", [1.5], {})], periods=10, rate=20.0))

@@ -42,6 +42,7 @@ def recorded_as(laboratory, robot, effect, joint, shape):
     return Bench(data, (*base_effects(robot), *spring_effects(robot)))
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("effect", list(LARGE))
 def test_amounts_begin_right_with_springs_that_are_described_wrong(laboratory, softer, effect):
     bench = recorded_as(laboratory, softer, effect, "ankle", LARGE[effect])
@@ -62,6 +63,7 @@ def test_a_large_error_of_an_encoder_is_found(laboratory, effect, joint):
     assert found.final.fit.statistic < 1.2 * found.final.fit.dof
 
 
+@pytest.mark.scenario
 def test_what_is_far_above_what_is_of_interest_is_not_begun_again(laboratory, monkeypatch):
     bench = laboratory.bench(laboratory.record([("encoder_offset", "hip", [], LARGE["encoder_offset"])], periods=6))
     start = settle(bench, bench.effects)

@@ -51,6 +51,7 @@ def test_a_push_that_leaves_nearly_nothing_is_none_of_another_form(laboratory, a
         assert (tried.p_value < 1e-100) is (stays or not nameless)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("first", [0, 1])
 def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, first):
     """Whichever was found first; alone the other one is needed."""
@@ -64,6 +65,7 @@ def test_of_two_that_only_bend_each_other_the_lesser_goes(unequal, monkeypatch, 
     assert named(still_needed(bench, begun)) == {("torque_offset", "knee")}
 
 
+@pytest.mark.scenario
 def test_of_two_that_only_bend_each_other_the_one_goes_without_which_the_other_can_be(unequal, monkeypatch):
     """Though what cannot be fits better: alone it would go as well, and nothing be left."""
     bench, found = unequal
@@ -79,6 +81,7 @@ def test_of_two_that_only_bend_each_other_the_one_goes_without_which_the_other_c
     assert named(still_needed(bench, found)) == {("stribeck_friction", "hip")}
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("own", "left"), [(4e-4, 1), (6e-4, 2)])
 def test_what_is_smaller_than_what_matters_goes_however_the_model_bends_without_it(unequal, monkeypatch, own, left):
     bench, found = unequal
@@ -90,6 +93,7 @@ def test_what_is_smaller_than_what_matters_goes_however_the_model_bends_without_
     assert still_needed(bench, found).added == left
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("hidden", "left"), [(False, 0), (True, 2)])
 def test_what_hardly_shows_stays_where_another_takes_it_up(unequal, monkeypatch, hidden, left):
     bench, found = unequal
@@ -98,6 +102,7 @@ def test_what_hardly_shows_stays_where_another_takes_it_up(unequal, monkeypatch,
     assert still_needed(bench, found).added == left
 
 
+@pytest.mark.scenario
 def test_what_ended_at_the_end_of_its_range_beside_the_others_goes(unequal):
     """It was at none when it was added: the others were missing yet."""
     bench, found = unequal
@@ -126,6 +131,7 @@ def test_what_is_not_physical_in_the_end_is_not_found(rippled):
     assert eliminate(bench, Settled(replace(with_it, values=bent), right.noise), [1e-9], 1000)[1] == []
 
 
+@pytest.mark.scenario
 def test_what_became_too_short_is_not_needed(unequal, monkeypatch):
     bench, selection = unequal
     position, now = len(bench.effects), selection.final

@@ -38,6 +38,7 @@ def single(bench, now, effect):
     return refitted(bench, now.fit.effects, best.effect, (), now.noise, now.fit.parameters)
 
 
+@pytest.mark.scenario
 def test_both_are_found_where_no_single_one_is(with_a_constant, monkeypatch):
     """To within their standard deviations; the best single effect is another one, and leaves most."""
     bench, start = with_a_constant
@@ -61,6 +62,7 @@ def test_both_are_found_where_no_single_one_is(with_a_constant, monkeypatch):
         assert abs(found.values[own]) == pytest.approx(true, abs=3.0 * found.std(own))
 
 
+@pytest.mark.scenario
 def test_they_stay_when_what_is_not_needed_is_taken_out(with_a_constant):
     """Without the constant an element that sticks would stand in for it, and pull the wrong way."""
     bench, start = with_a_constant
@@ -72,6 +74,7 @@ def test_they_stay_when_what_is_not_needed_is_taken_out(with_a_constant):
     }
 
 
+@pytest.mark.scenario
 def test_neither_stays_where_they_are_not_possible(with_a_constant, monkeypatch):
     bench, start = with_a_constant
     monkeypatch.setattr("sea_ident.discrepancy.search.search._possible", lambda *given: False)
@@ -80,6 +83,7 @@ def test_neither_stays_where_they_are_not_possible(with_a_constant, monkeypatch)
     assert found.final.fit.effects == start.fit.effects
 
 
+@pytest.mark.scenario
 def test_one_of_them_alone_is_told_alone(laboratory, nothing_missing):
     """Friction that does without a constant, a constant without friction, and where nothing is missing."""
     bench = laboratory.bench(laboratory.record(rubbing()))

@@ -31,11 +31,13 @@ def beginning(bench, start, **shape):
     return bench.fit(effects, start.noise, start=start.fit.parameters)
 
 
+@pytest.mark.scenario
 def test_the_motion_passes_the_kink(kinked):
     knee = kinked[0].data.motion.deflection[:, 1]
     assert knee.min() < 0.0 < KINK < knee.max()
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("off", [0.7, 1.4])
 def test_a_kink_is_found_from_one_nearby(kinked, off):
     bench, start = kinked
@@ -47,6 +49,7 @@ def test_a_kink_is_found_from_one_nearby(kinked, off):
     assert value == pytest.approx(STIFFER, abs=4.0 * std + 0.01 * STIFFER)
 
 
+@pytest.mark.scenario
 def test_a_kink_at_rest_and_what_has_none_stay(kinked):
     bench, start = kinked
     fit = beginning(bench, start)
@@ -54,6 +57,7 @@ def test_a_kink_at_rest_and_what_has_none_stay(kinked):
     assert at_its_kink(bench, fit, start.noise, 0) is fit
 
 
+@pytest.mark.scenario
 def test_a_kink_that_is_not_passed_stays(kinked):
     bench, start = kinked
     beyond = 1.1 * float(np.max(bench.data.motion.deflection[:, 1]))
@@ -61,6 +65,7 @@ def test_a_kink_that_is_not_passed_stays(kinked):
     assert at_its_kink(bench, fit, start.noise, len(fit.effects) - 1) is fit
 
 
+@pytest.mark.scenario
 def test_a_kink_that_is_right_stays(kinked):
     bench, start = kinked
     fit = beginning(bench, start, kink=KINK)
@@ -68,6 +73,7 @@ def test_a_kink_that_is_right_stays(kinked):
     assert settled_in_form(bench, now, len(bench.effects), at_its_kink) is now
 
 
+@pytest.mark.scenario
 def test_a_kink_has_a_price_and_both_its_sides_are_straight(kinked):
     bench, _ = kinked
     plain = make_effect("asymmetric_spring", "knee")
@@ -76,6 +82,7 @@ def test_a_kink_has_a_price_and_both_its_sides_are_straight(kinked):
     assert penalty(bent, bench) == penalty(plain, bench)
 
 
+@pytest.mark.scenario
 def test_a_spring_with_a_kink_elsewhere_is_named_alone(kinked):
     bench, _ = kinked
     selection = search(bench, bench.effects)
@@ -83,6 +90,7 @@ def test_a_spring_with_a_kink_elsewhere_is_named_alone(kinked):
     assert selection.effects[0].kink == pytest.approx(KINK, rel=0.02)
 
 
+@pytest.mark.scenario
 def test_a_candidate_is_compared_with_its_kink_where_it_belongs(kinked):
     bench, start = kinked
     effect = make_effect("asymmetric_spring", "knee", kink=0.7 * KINK)
@@ -90,6 +98,7 @@ def test_a_candidate_is_compared_with_its_kink_where_it_belongs(kinked):
     assert fit.effects[-1].kink == pytest.approx(KINK, rel=0.02)
 
 
+@pytest.mark.scenario
 def test_what_was_found_beside_something_else_moves_its_kink(kinked):
     bench, start = kinked
     now = Settled(beginning(bench, start, kink=0.7 * KINK), start.noise)

@@ -44,6 +44,7 @@ def test_what_promised_about_as_much_as_what_explains_it_all_is_compared(laborat
     assert fit.effects[-1].name == "torque_offset"
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "joint", "promised", "is_tried"),
     [

@@ -29,6 +29,7 @@ def fitted(pushed, *pushes):
     return settle_again(bench, bench.refine(effects, start.noise, start=start.fit.parameters, only=len(bench.effects)))
 
 
+@pytest.mark.scenario
 def test_two_on_the_wrong_links_are_one_on_the_right_one(pushed):
     bench, _ = pushed
     beside = push("ankle", 0.6, 1.2)
@@ -44,6 +45,7 @@ def test_two_on_the_wrong_links_are_one_on_the_right_one(pushed):
     assert after.fit.parameters["knee.external_force_z"] == pytest.approx(3.0, abs=0.3)
 
 
+@pytest.mark.scenario
 def test_a_search_tells_one(pushed, monkeypatch):
     """Where nothing more is found, and what is there is not exchanged."""
     bench, start = pushed
@@ -56,6 +58,7 @@ def test_a_search_tells_one(pushed, monkeypatch):
     assert len(found.p_values) == found.added == 2
 
 
+@pytest.mark.scenario
 def test_pushes_at_other_times_or_other_effects_stay(pushed, monkeypatch):
     """Nothing is tried in their place."""
     bench, _ = pushed
@@ -66,6 +69,7 @@ def test_pushes_at_other_times_or_other_effects_stay(pushed, monkeypatch):
     assert left == [0, 1, 2]
 
 
+@pytest.mark.scenario
 def test_two_that_no_other_does_for_stay(pushed, laboratory):
     """Pushes at the same time on both ends of the leg, across each other."""
     planted = [(push("hip"), [0.0, 0.0, 40.0]), (push("ankle"), [8.0, 0.0, 0.0])]

@@ -70,6 +70,7 @@ def test_what_another_effect_leaves_speaks_for_no_other_power(laboratory, monkey
     assert with_their_powers(bench, cube, len(bench.effects)) is cube
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(("planted", "held"), [(2.0, True), (2.2, False)])
 def test_a_spring_stiffens_by_its_own_power_where_that_is_told_from_the_one_tried(laboratory, planted, held):
     effect = make_effect("spring_stiffening", "knee", exponent=2.0)

@@ -197,6 +197,7 @@ def test_of_two_elements_that_slip_the_one_is_not_taken_for_the_other(laboratory
     )
 
 
+@pytest.mark.scenario
 def test_a_delay_is_not_hidden_by_friction_that_seemed_to_turn_slowly(laboratory):
     """A motor whose torque is late, in a model whose friction was given three times the width over which it turns."""
     bench = laboratory.bench(laboratory.record([("torque_delay", "hip", [], {"delay": 0.012})], periods=6))

@@ -59,6 +59,7 @@ def test_far_from_right_nothing_gives_way_before_all_is_added(unequal, monkeypat
     assert named(again) == named(found)
 
 
+@pytest.mark.scenario
 def test_a_small_effect_at_another_joint_is_found_beside_a_large_one(unequal):
     found = unequal[1]
     assert named(found) == {("torque_offset", "knee"), ("stribeck_friction", "hip")}
@@ -66,6 +67,7 @@ def test_a_small_effect_at_another_joint_is_found_beside_a_large_one(unequal):
     assert found.final.fit.values[offset] == pytest.approx(-2.0, abs=4.0 * found.final.fit.std(offset))
 
 
+@pytest.mark.scenario
 def test_the_small_one_would_not_count_at_the_joint_of_the_large_one(unequal):
     """What it changes is less than the share of the large one that counts as never known better, but elsewhere."""
     bench, found = unequal
@@ -81,6 +83,7 @@ def test_the_small_one_would_not_count_at_the_joint_of_the_large_one(unequal):
     assert np.any(changes["hip"] > BESIDE_ANOTHER * changes["knee"])
 
 
+@pytest.mark.scenario
 def test_what_was_found_stands_still(unequal):
     bench, found = unequal
     again = settle_again(bench, found.final.fit)
@@ -104,6 +107,7 @@ def test_a_model_settles_after_an_exchange(unequal, monkeypatch):
     assert again.final.fit.statistic == pytest.approx(found.final.fit.statistic, rel=0.02)
 
 
+@pytest.mark.scenario
 def test_a_push_has_its_edges_right_before_another_takes_its_place(unequal, monkeypatch):
     bench, _ = unequal
     calls = []
@@ -136,6 +140,7 @@ def test_when_a_push_begins_and_ends_is_paid_for(nothing_missing):
     assert push == pytest.approx(8.0 * offset)
 
 
+@pytest.mark.scenario
 def test_a_torque_constant_is_all_that_a_motor_with_another_one_lacks(nothing_missing):
     """Of three motors that share one rotor inertia the torque of one is recorded two fifths too large."""
     data = nothing_missing[0].data
@@ -300,6 +305,7 @@ def test_a_search_is_lost_far_from_right_where_nothing_takes_most_of_what_is_lef
     assert _lost(now, before, added, candidates) == lost
 
 
+@pytest.mark.scenario
 def test_a_search_that_goes_on_knows_what_was_outdone_before(unequal, monkeypatch):
     bench, found = unequal
     outdone = {(("torque_offset", "knee"), ("torque_ripple", "knee")): Outdone(0.5, 0.1)}

@@ -36,11 +36,13 @@ def by_the_second(slipping):
     return bench.refine(begun.effects, start.noise, start=begun.parameters, only=len(bench.effects))
 
 
+@pytest.mark.scenario
 def test_the_motion_shows_one_element(slipping):
     swing = 0.5 * np.ptp(slipping[0].data.motion.deflection[:, 1])
     assert SLIP < swing < WIDER * SLIP
 
 
+@pytest.mark.scenario
 def test_a_second_element_is_told_as_the_first(slipping, by_the_second):
     bench, start = slipping
     position = len(by_the_second.effects) - 1
@@ -52,6 +54,7 @@ def test_a_second_element_is_told_as_the_first(slipping, by_the_second):
     assert found.values[narrow] == pytest.approx(NARROW, abs=3.0 * found.std(narrow))
 
 
+@pytest.mark.scenario
 def test_a_first_element_that_is_there_stays(slipping, monkeypatch):
     bench, start = slipping
     fit = with_slip(bench, start, SLIP)
@@ -61,6 +64,7 @@ def test_a_first_element_that_is_there_stays(slipping, monkeypatch):
     assert settled_in_form(bench, now, len(bench.effects), by_the_first_element) is now
 
 
+@pytest.mark.scenario
 def test_nothing_but_friction_in_a_spring_is_told_otherwise(slipping):
     bench, start = slipping
     nothing = (*start.fit.effects, make_effect("torque_offset", "hip"))
@@ -69,6 +73,7 @@ def test_nothing_but_friction_in_a_spring_is_told_otherwise(slipping):
         assert by_the_first_element(bench, fit, start.noise, position) is fit
 
 
+@pytest.mark.scenario
 def test_a_second_element_stays_where_the_first_does_not_do_for_it(slipping, by_the_second, monkeypatch):
     bench, start = slipping
     refine = bench.refine
@@ -83,6 +88,7 @@ def test_a_second_element_stays_where_the_first_does_not_do_for_it(slipping, by_
     assert by_the_first_element(bench, by_the_second, start.noise, position) is by_the_second
 
 
+@pytest.mark.scenario
 def test_a_search_tells_the_first_element(slipping, by_the_second):
     bench, start = slipping
     begun = Selection(start, Settled(by_the_second, start.noise), 1, (0.0,))
@@ -98,6 +104,7 @@ def beside_a_constant(bench, start, slip, *, elements=2, constant=True, joint="k
     return bench.fit(effects, start.noise, start=start.fit.parameters)
 
 
+@pytest.mark.scenario
 def test_an_element_that_sticks_is_left_out_beside_a_constant(slipping, monkeypatch):
     """Of the elastic law and the constant it is a sum."""
     bench, start = slipping
@@ -116,6 +123,7 @@ def test_an_element_that_sticks_is_left_out_beside_a_constant(slipping, monkeypa
         assert without_what_sticks(bench, other, start.noise, len(other.effects) - 1) is other
 
 
+@pytest.mark.scenario
 def test_an_element_that_sticks_is_not_added(slipping, monkeypatch):
     """However much it explains."""
     bench, start = slipping
@@ -130,6 +138,7 @@ def test_an_element_that_sticks_is_not_added(slipping, monkeypatch):
     assert with_its_second_element(bench, short, start.noise) is not short
 
 
+@pytest.mark.scenario
 def test_an_element_that_slips_stays(laboratory, monkeypatch):
     """And is added where it does."""
     recording = laboratory.record([("spring_hysteresis", "knee", [0.5, 0.4], {"slip": 0.0015})], periods=10)

@@ -163,6 +163,7 @@ def test_a_temperature_that_goes_its_own_way_is_no_drift(laboratory, monkeypatch
     assert (trend.effect.name, trend.effect.joint, trend.alternatives) == ("temperature_friction", "knee", ())
 
 
+@pytest.mark.scenario
 def test_what_the_library_lacks_is_not_named_by_a_part_of_it(softening, monkeypatch):
     """A spring that softens, with no such effect to name: something changes, and nothing that is known does that."""
     bench, now = softening

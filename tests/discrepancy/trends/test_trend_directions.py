@@ -102,6 +102,7 @@ def told(columns, direction, values, middle, temperature=None):
     return columns.inside(direction, found, middle, temperature)
 
 
+@pytest.mark.scenario
 def test_what_bends_is_seen_when_its_columns_are_large(softening):
     """In a half of a period in which a spring is hardly bent, its stiffness does not show."""
     bench, fit = softening
@@ -125,6 +126,7 @@ def test_what_bends_is_seen_when_its_columns_are_large(softening):
     assert found.values == pytest.approx(bent.values, rel=0.02)
 
 
+@pytest.mark.scenario
 def test_columns_that_are_large_one_after_the_other_are_told_apart(softening):
     """Viscous friction is large where a motor is fast, and what bends has changed more or less by then."""
     bench, fit = softening

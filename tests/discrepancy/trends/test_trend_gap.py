@@ -25,6 +25,7 @@ def drifting(laboratory, periods, **options):
     return bench, settle(bench, bench.effects).fit
 
 
+@pytest.mark.scenario
 def test_what_drifts_goes_with_its_values_and_has_the_size_of_its_torque(laboratory):
     bench, fit = drifting(laboratory, 12)
     gap = trend_gap(bench, fit, [trend(RATE)])
@@ -69,6 +70,7 @@ def test_noise_is_that_of_the_periods_and_of_every_course(laboratory):
     assert two.noise["knee"] == pytest.approx(np.sqrt(2.0) * one.noise["knee"], rel=1e-6)
 
 
+@pytest.mark.scenario
 def test_another_motion_that_begins_as_the_first_did_drifts_as_far(laboratory):
     bench, fit = drifting(laboratory, 8, motion=1, seed=9)
     gap = trend_gap(bench, fit, [trend(RATE)])
@@ -76,6 +78,7 @@ def test_another_motion_that_begins_as_the_first_did_drifts_as_far(laboratory):
     assert gap.shrink > 0.9
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("name", "joint", "rate"), [("torque_constant_drift", "knee", 0.6), ("stiffness_drift", "hip", -150.0)]
 )

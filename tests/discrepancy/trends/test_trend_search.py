@@ -164,6 +164,7 @@ def test_share_that_another_explains():
     assert share == pytest.approx(0.25, rel=1e-6)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("time_constant", [40.0, 300.0, 1e6])
 def test_a_rate_is_as_sure_as_is_said_whether_its_course_bends_or_not(time_constant):
     """Where a bend just does not show, the rate at the start is another one than that of a straight line."""
