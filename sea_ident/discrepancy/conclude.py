@@ -13,7 +13,8 @@ from sea_ident.discrepancy.bench.fit import Fit
 from sea_ident.discrepancy.bench.gap import Gap, drowned, gap_of, noise_of_residual, torque_by_joint
 from sea_ident.discrepancy.bench.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.bench.settle import Settled
-from sea_ident.discrepancy.compared.heldout import HeldOut, Kind
+from sea_ident.discrepancy.compared.foretold import FAR_BEYOND, Left, left_of
+from sea_ident.discrepancy.compared.heldout import HeldOut
 from sea_ident.discrepancy.compared.reference import ParameterChange
 from sea_ident.discrepancy.compared.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.evidence import assess
@@ -52,18 +53,15 @@ LARGEST_REMAINDER = 3e-3
 WORTH_A_NAME = 1e-2
 """Share of the torque from which on what is left would be an effect of its own [-]: then no other name explains it."""
 
-FAR_BEYOND = 3.0
-"""Times the noise from which on a gap on other data counts, ..."""
-
-BEYOND_THE_MOTION = 0.05
-"""... or where nothing is missing, with this share of the torque there [-]: a model that is well identified leaves one
-percent of another motion at most, ..."""
-
 GOES = 0.5
-"""... shrink of the gap on the recording itself from which on it should go there too [-], ..."""
+"""Where a gap on other data is far beyond the noise: shrink of that on the recording itself from which on it should go
+there too [-], ..."""
 
 STAYS = 0.3
 """... and share of that shrink below which it does not [-]."""
+
+FORETELLS = (Verdict.NONE, Verdict.NAMED, Verdict.NAMED_WITH_REMAINDER, Verdict.AMBIGUOUS, Verdict.SUSPECT)
+"""Verdicts with a model that should tell what another motion takes."""
 
 UNEXPLAINED = 0.25
 """Share of the excess from which on the effects found are no explanation of it [-]: as large as an effect by itself,
@@ -136,9 +134,11 @@ def conclude(
     apart = notes.apart and verdict in (Verdict.NOT_IN_LIBRARY, Verdict.SUSPECT)
     if apart:
         verdict, lost, remainder = Verdict.CANNOT_TELL, True, 0.0
-    beyond: dict[str, tuple[float, float]] = {}
-    if verdict is Verdict.NONE and held is not None and held_gap is not None:
-        beyond = beyond_the_motion(held, held_gap)
+    left_there: dict[str, Left] = {}
+    if verdict in FORETELLS and held is not None and held_gap is not None:
+        left_there = left_of(held, held_gap, final.fit)
+        if verdict is Verdict.SUSPECT:  # why is said already, but for what a recording hardly tells
+            left_there = {joint: left for joint, left in left_there.items() if left.as_unsure}
     judged = confirmed.beside or (confirmed.bench, confirmed.final)
     standing = longest_standing(judged[0].data)
     facts = words.Facts(
@@ -146,8 +146,8 @@ def conclude(
         periods=bench.data.periods, p_value=p_value, trend=trends, change=change,
         units=check.torque_units(bench.robot),
         kind=None if held is None else held.kind, nameless=nameless, sound=not (notes.fatal or doubted or apart),
-        standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)), beyond=beyond,
-        still=still,
+        standing=standing, motors_too_fast=motors_too_fast(State(bench.robot, bench.data.motion)),
+        left_there=left_there, still=still,
     )  # fmt: skip
     # what follows from such positions is no further fault of the recording
     warnings = (*notes.warnings, *trends.notes, *words.reservations(facts))
@@ -228,19 +228,6 @@ def predicts(held: Gap, torque: Mapping[str, float]) -> bool:
     Wrong units, exchanged joints or another robot leave more.
     """
     return all(left <= torque[joint] for joint, left in held.after.items())
-
-
-def beyond_the_motion(held: HeldOut, gap: Gap) -> dict[str, tuple[float, float]]:
-    """What a model leaves of the torque of another recording, where that is far beyond noise: [N m], and its share [-].
-
-    Where nothing is missing on the recording, it is what this motion does not tell that is wrong.
-    """
-    if held.kind is Kind.OTHER_PERIODS:
-        return {}
-    torque = torque_by_joint(held.bench)
-    left = {joint: (size, size / max(torque[joint], 1e-300)) for joint, size in gap.after.items()}
-    far = (joint for joint, size in gap.after.items() if size > FAR_BEYOND * gap.noise[joint])
-    return {joint: left[joint] for joint in far if left[joint][1] > BEYOND_THE_MOTION}
 
 
 def verdict_of(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from sea_ident.discrepancy.bench.gap import Gap
 from sea_ident.discrepancy.bench.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.bench.lack import LACK_LEVEL
+from sea_ident.discrepancy.compared.foretold import Left
 from sea_ident.discrepancy.compared.heldout import Kind
 from sea_ident.discrepancy.compared.reference import ParameterChange
 from sea_ident.discrepancy.compared.transfer import TRANSFERS, TRANSFERS_ALONE
@@ -48,8 +49,7 @@ class Facts:
         standing: what is not compared beside reversals, at the joint where that is most.
         motors_too_fast: joints whose motors turn too fast for the samples to show a ripple of theirs.
         still: joints whose motors stand throughout.
-        beyond: what the model leaves of the torque of a held-out recording, by joint, where this one does not tell it:
-            [N m] or [N], and its share [-].
+        left_there: what the model leaves of the torque of a held-out recording, by joint, where that is much.
     """
 
     verdict: Verdict
@@ -68,7 +68,7 @@ class Facts:
     standing: Standing | None = None
     motors_too_fast: tuple[str, ...] = ()
     still: tuple[str, ...] = ()
-    beyond: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    left_there: Mapping[str, Left] = field(default_factory=dict)
 
     @property
     def added(self) -> tuple[MissingEffect, ...]:
@@ -97,8 +97,7 @@ def paragraph(facts: Facts) -> str:
         parts.append(f"{_still(facts)}.")
     elif facts.verdict is Verdict.NONE and facts.standing is not None and facts.standing.share > 0.0:
         parts.append(f"{_not_compared(facts, facts.standing)}.")
-    if facts.beyond:
-        parts.append(f"{_beyond(facts)}.")
+    parts.extend(f"{text}." for text in _left_there(facts))
     if facts.verdict in (Verdict.NONE, Verdict.NOT_IN_LIBRARY) and facts.motors_too_fast:
         parts.append(
             f"Ripple of the turns of the motor of {', '.join(facts.motors_too_fast)} is too fast for these samples and "
@@ -250,8 +249,7 @@ def reservations(facts: Facts) -> list[str]:
         )
     elif facts.added and facts.kind is None:
         found.append("no held-out motion was given: what is named was not tested on another motion")
-    if facts.beyond:
-        found.append(f"{_beyond(facts)}. Diagnose that one as well")
+    found.extend(f"{text}. Diagnose that one as well" for text in _left_there(facts))
     if facts.still:
         found.append(f"{_still(facts)}. Move every joint, or leave those out (joints, on the command line --joints)")
     elif facts.standing is not None and facts.standing.share > STANDS_LONG:
@@ -270,15 +268,30 @@ def reservations(facts: Facts) -> list[str]:
     return found
 
 
-def _beyond(facts: Facts) -> str:
-    """Where the model does not foretell the held-out recording for what the motion of this one does not tell."""
-    told = ", ".join(
-        f"{left:.3g} {facts.units[joint]} at {joint} ({_percent(share)} of the torque)"
-        for joint, (left, share) in facts.beyond.items()
-    )
-    return (
-        f"On the recording that was held out the model leaves {told}: that motion shows what this one does not, or "
-        "something was changed between the two"
+def _left_there(facts: Facts) -> list[str]:
+    """What the model leaves of the held-out recording: where its parameters are as unsure there, and where not."""
+    unsure = {joint: left for joint, left in facts.left_there.items() if left.as_unsure}
+    wrong = {joint: left for joint, left in facts.left_there.items() if not left.as_unsure}
+    found = []
+    if wrong:
+        found.append(
+            f"On the recording that was held out the model leaves {_sizes(facts, wrong)}: that motion shows what this "
+            "one does not, or something was changed between the two"
+        )
+    if unsure:
+        least_known = ", ".join(dict.fromkeys(left.least_known for left in unsure.values()))
+        found.append(
+            f"On the recording that was held out the model leaves {_sizes(facts, unsure)}, which is no more than its "
+            f"parameters are unsure by on that motion (most of all {least_known}): this one hardly tells them"
+        )
+    return found
+
+
+def _sizes(facts: Facts, left: Mapping[str, Left]) -> str:
+    """What is left by joint, and its share of the torque."""
+    return ", ".join(
+        f"{each.size:.3g} {facts.units[joint]} at {joint} ({_percent(each.share)} of the torque)"
+        for joint, each in left.items()
     )
 
 

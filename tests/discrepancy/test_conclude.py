@@ -13,16 +13,13 @@ import pytest
 
 import sea_ident
 from sea_ident.discrepancy import Verdict, searching
-from sea_ident.discrepancy.bench.gap import Gap, torque_by_joint
+from sea_ident.discrepancy.bench.gap import Gap
 from sea_ident.discrepancy.bench.lack import remainder_share
-from sea_ident.discrepancy.bench.settle import settle
 from sea_ident.discrepancy.changing import Changing
-from sea_ident.discrepancy.compared.heldout import HeldOut, Kind
 from sea_ident.discrepancy.conclude import (
     _known_better,
     _locations,
     beyond_the_library,
-    beyond_the_motion,
     explains,
     goes_there,
     predicts,
@@ -145,19 +142,6 @@ def test_what_predicts_worse_than_no_model_does_not_hold_there():
     assert not goes_there(found, wild, torque, ())
     # of what a joint carries that stood, nothing was known: that is no fault of what was found
     assert goes_there(found, wild, torque, ("hip",))
-
-
-def test_what_is_left_of_another_motion_is_told_where_it_is_more_than_parameters_are_unsure_by(laboratory):
-    bench = laboratory.bench(laboratory.record(motion=1))
-    now = settle(bench, bench.effects)
-    held = HeldOut(bench, now.fit, now.fit, now.noise, now, (), "other", kind=Kind.OTHER_MOTION)
-    torque = torque_by_joint(bench)
-    left = {"hip": 0.2 * torque["hip"], "knee": 0.2 * torque["knee"], "ankle": 0.03 * torque["ankle"]}
-    gap = Gap(left, left, {"hip": 0.01 * torque["hip"], "knee": 0.1 * torque["knee"], "ankle": 0.0})
-    # far beyond noise at the knee it is not, and at the ankle it is little
-    assert beyond_the_motion(held, gap) == {"hip": (left["hip"], pytest.approx(0.2))}
-    # of the same periods nothing else can be left
-    assert beyond_the_motion(replace(held, kind=Kind.OTHER_PERIODS), gap) == {}
 
 
 @pytest.mark.scenario

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench.gap import Gap, gap_of
+from sea_ident.discrepancy.compared.foretold import Left
 from sea_ident.discrepancy.compared.heldout import Kind
 from sea_ident.discrepancy.compared.reference import ParameterChange
 from sea_ident.discrepancy.measured.standing import Standing
@@ -220,13 +221,35 @@ def test_motors_that_stand_are_told_of_with_every_verdict_in_the_place_of_what_i
     assert warning.endswith("Move every joint, or leave those out (joints, on the command line --joints)")
 
 
-def test_what_is_left_of_another_recording_is_said_with_its_share():
-    beyond = replace(facts(Verdict.NONE), missing=(), beyond={"hip": (3.21, 0.12)})
-    told = "On the recording that was held out the model leaves 3.21 N m at hip (12 % of the torque): that motion shows"
-    assert told in paragraph(beyond)
-    (warning,) = reservations(beyond)
-    assert warning.startswith(told)
+@pytest.mark.parametrize(
+    ("std", "why"),
+    [
+        (0.1, "that motion shows what this one does not, or something was changed between the two"),
+        (3.0, "which is no more than its parameters are unsure by on that motion (most of all torque_ripple at hip)"),
+    ],
+)
+@pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.NAMED])
+def test_what_is_left_of_another_recording_is_said_with_its_share_and_why(verdict, std, why):
+    known = facts(verdict)
+    left = replace(known, missing=() if verdict is Verdict.NONE else known.missing,
+                   left_there={"hip": Left(3.21, 0.12, std, "torque_ripple at hip")})  # fmt: skip
+    told = "On the recording that was held out the model leaves 3.21 N m at hip (12 % of the torque)"
+    assert told in paragraph(left)
+    assert why in paragraph(left)
+    (warning,) = (text for text in reservations(left) if text.startswith(told))
+    assert why in warning
     assert warning.endswith("Diagnose that one as well")
+
+
+def test_what_is_left_of_two_joints_for_two_reasons_is_said_of_each():
+    left = {"hip": Left(3.21, 0.12, 0.1, "rotor_inertia at hip"), "knee": Left(1.5, 0.3, 1.0, "torque_ripple at hip")}
+    units = {"hip": "N m", "knee": "N m"}
+    known = replace(facts(Verdict.NONE), missing=(), left_there=left, units=units)
+    wrong, unsure = (text for text in reservations(known) if text.startswith("On the recording"))
+    assert "3.21 N m at hip" in wrong
+    assert "knee" not in wrong
+    assert "1.5 N m at knee (30 % of the torque), which is no more" in unsure
+    assert "rotor_inertia" not in unsure
 
 
 @pytest.mark.parametrize(

@@ -35,30 +35,29 @@ def as_known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
     return Known(contribution(bench, fit, positions), stiffness)
 
 
-def torque_factor(bench: Bench, fit: Fit, position: int) -> ComplexArray:
-    """(H + 1, E, r) factor of the covariance of the torque of an effect on the motion of a bench, which may be another.
+def torque_factor(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
+    """(H + 1, E, r) factor of the covariance of the torque of some effects on the motion of a bench, perhaps another.
 
-    From that of its parameters and shapes; larger in proportion where the model leaves more than noise.
+    From that of their parameters and shapes; larger in proportion where the model leaves more than noise.
     """
-    effect, count = fit.effects[position], len(fit.columns)
-    start = sum(bench.counts(fit.effects)[:position])
-    width = len(effect.columns(bench.robot))
-    directions, factors = [], []
-    if width:
-        directions.append(bench.column_spectra(effect, fit.effects))
-        factors.append(fit.covariance_factor[start : start + width])
-    own = [(k, pair) for k, pair in enumerate(fit.free_shapes) if pair[0] == position]
+    count, begins = len(fit.columns), np.cumsum([0, *bench.counts(fit.effects)])
+    directions, rows = [], list[int]()
+    for position in positions:
+        if begins[position] < begins[position + 1]:
+            directions.append(bench.column_spectra(fit.effects[position], fit.effects))
+            rows.extend(range(begins[position], begins[position + 1]))
+    own = [(k, pair) for k, pair in enumerate(fit.free_shapes) if pair[0] in positions]
     if own:
         directions.append(bench.tangents(fit.effects, fit.columns, fit.values, [pair for _, pair in own])[0])
-        factors.append(fit.covariance_factor[[count + k for k, _ in own]])
+        rows.extend(count + k for k, _ in own)
     if not directions:
         return np.zeros((bench.data.harmonics + 1, len(bench.data.equations), 0), dtype=np.complex128)
     # no more columns than there are parameters and shapes
-    least = np.linalg.qr(np.concatenate(factors).T)[1].T
+    least = np.linalg.qr(fit.covariance_factor[rows].T)[1].T
     return np.asarray(np.sqrt(fit.unit) * (np.concatenate(directions, axis=2) @ least), dtype=np.complex128)
 
 
 def torque_std(bench: Bench, fit: Fit, position: int) -> FloatArray:
     """(N, E) standard deviation of the torque of an effect over a period."""
-    rows = waveform(torque_factor(bench, fit, position), bench.data.samples)
+    rows = waveform(torque_factor(bench, fit, [position]), bench.data.samples)
     return np.asarray(np.linalg.norm(rows, axis=2), dtype=np.float64)

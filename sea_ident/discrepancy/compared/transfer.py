@@ -202,7 +202,7 @@ class _Trial:
             fixed: the model with the effect as it was found.
         """
         bench, unit = self._bench, self._now.fit.unit
-        factor = torque_factor(bench, self._fit, self._position) * fixed.scale[:, None]
+        factor = torque_factor(bench, self._fit, [self._position]) * fixed.scale[:, None]
         rows = fixed.off(whiten(bench.whitener(self._now.noise), factor)) / np.sqrt(unit)
         axes, sizes, _ = np.linalg.svd(rows, full_matrices=False)
         taken = (axes.T @ fixed.whitened) ** 2 * (sizes**2 / (1.0 + sizes**2))

@@ -158,7 +158,7 @@ def test_an_effect_is_as_sure_elsewhere_as_it_was_found(elsewhere, lacking):
     other, now = one._bench, one._now
     assert (now.fit.unit > 2.0) is bool(lacking)
     fixed, _ = one.as_found()
-    rows = torque_factor(other, one._fit, one._position) * fixed.scale[:, None]
+    rows = torque_factor(other, one._fit, [one._position]) * fixed.scale[:, None]
     free = fixed.off(other.whitening(now.noise).flat(rows))
     unit = now.fit.unit
     covariance = unit * np.eye(len(fixed.whitened)) + free @ free.T
