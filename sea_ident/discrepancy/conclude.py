@@ -13,11 +13,11 @@ from sea_ident.discrepancy.bench.fit import Fit
 from sea_ident.discrepancy.bench.gap import Gap, drowned, gap_of, noise_of_residual, torque_by_joint
 from sea_ident.discrepancy.bench.lack import LACK_LEVEL, lack_of_fit, remainder_share
 from sea_ident.discrepancy.bench.settle import Settled
-from sea_ident.discrepancy.compared.foretold import FAR_BEYOND, Left, left_of
 from sea_ident.discrepancy.compared.heldout import HeldOut
 from sea_ident.discrepancy.compared.reference import ParameterChange
 from sea_ident.discrepancy.compared.transfer import TRANSFERS, TRANSFERS_ALONE
 from sea_ident.discrepancy.evidence import assess
+from sea_ident.discrepancy.evidence.foretold import FAR_BEYOND, Left, left_of
 from sea_ident.discrepancy.evidence.locate import locate
 from sea_ident.discrepancy.evidence.named import named_effects, named_trend
 from sea_ident.discrepancy.measured import check
@@ -136,7 +136,7 @@ def conclude(
         verdict, lost, remainder = Verdict.CANNOT_TELL, True, 0.0
     left_there: dict[str, Left] = {}
     if verdict in FORETELLS and held is not None and held_gap is not None:
-        left_there = left_of(held, held_gap, final.fit)
+        left_there = left_of(bench, final, held, held_gap)
         if verdict is Verdict.SUSPECT:  # why is said already, but for what a recording hardly tells
             left_there = {joint: left for joint, left in left_there.items() if left.as_unsure}
     judged = confirmed.beside or (confirmed.bench, confirmed.final)

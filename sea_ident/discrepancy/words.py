@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from sea_ident.discrepancy.bench.gap import Gap
 from sea_ident.discrepancy.bench.judge import FEWEST_TO_SEARCH
 from sea_ident.discrepancy.bench.lack import LACK_LEVEL
-from sea_ident.discrepancy.compared.foretold import Left
 from sea_ident.discrepancy.compared.heldout import Kind
 from sea_ident.discrepancy.compared.reference import ParameterChange
 from sea_ident.discrepancy.compared.transfer import TRANSFERS, TRANSFERS_ALONE
+from sea_ident.discrepancy.evidence.foretold import Left
 from sea_ident.discrepancy.measured.data import PeriodData
 from sea_ident.discrepancy.measured.standing import Standing
 from sea_ident.discrepancy.nameless.unnamed import Unnamed

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sea_ident.discrepancy.bench.gap import Gap, gap_of
-from sea_ident.discrepancy.compared.foretold import Left
 from sea_ident.discrepancy.compared.heldout import Kind
 from sea_ident.discrepancy.compared.reference import ParameterChange
+from sea_ident.discrepancy.evidence.foretold import Left
 from sea_ident.discrepancy.measured.standing import Standing
 from sea_ident.discrepancy.result.diagnosis import _gap
 from sea_ident.discrepancy.result.findings import Alternative, MissingEffect, MissingParameter, Verdict, chance

@@ -35,10 +35,16 @@ def as_known(bench: Bench, fit: Fit, positions: Sequence[int]) -> Known:
     return Known(contribution(bench, fit, positions), stiffness)
 
 
-def torque_factor(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexArray:
+def torque_factor(bench: Bench, fit: Fit, positions: Sequence[int], wider: FloatArray | None = None) -> ComplexArray:
     """(H + 1, E, r) factor of the covariance of the torque of some effects on the motion of a bench, perhaps another.
 
     From that of their parameters and shapes; larger in proportion where the model leaves more than noise.
+
+    Args:
+        bench: the motion.
+        fit: the model.
+        positions: of the effects in it.
+        wider: (p + s,) by how much standard deviations of parameters and shapes are larger than by noise alone [-].
     """
     count, begins = len(fit.columns), np.cumsum([0, *bench.counts(fit.effects)])
     directions, rows = [], list[int]()
@@ -53,7 +59,8 @@ def torque_factor(bench: Bench, fit: Fit, positions: Sequence[int]) -> ComplexAr
     if not directions:
         return np.zeros((bench.data.harmonics + 1, len(bench.data.equations), 0), dtype=np.complex128)
     # no more columns than there are parameters and shapes
-    least = np.linalg.qr(fit.covariance_factor[rows].T)[1].T
+    factor = fit.covariance_factor[rows] * (1.0 if wider is None else wider[rows, None])
+    least = np.linalg.qr(factor.T)[1].T
     return np.asarray(np.sqrt(fit.unit) * (np.concatenate(directions, axis=2) @ least), dtype=np.complex128)
 
 

@@ -8,8 +8,9 @@ import pytest
 from sea_ident.discrepancy.bench.free_shapes import moved_within
 from sea_ident.discrepancy.bench.gap import Gap, gap_of, per_joint, torque_by_joint
 from sea_ident.discrepancy.bench.settle import settle
-from sea_ident.discrepancy.compared.foretold import foretold_std, left_of
 from sea_ident.discrepancy.compared.heldout import HeldOut, Kind, tried
+from sea_ident.discrepancy.evidence import foretold
+from sea_ident.discrepancy.evidence.foretold import foretold_std, left_of
 from sea_ident.discrepancy.search.search import Selection
 from sea_ident.effects import make_effect
 
@@ -46,12 +47,30 @@ def test_what_is_little_or_within_noise_or_of_the_same_periods_is_not_asked_for(
     torque = torque_by_joint(bench)
     sizes = {"hip": 0.2 * torque["hip"], "knee": 0.2 * torque["knee"], "ankle": 0.03 * torque["ankle"]}
     gap = Gap(sizes, sizes, {"hip": 0.01 * torque["hip"], "knee": 0.1 * torque["knee"], "ankle": 0.0})
-    (joint, left), *others = left_of(held, gap, now.fit).items()
+    (joint, left), *others = left_of(bench, now, held, gap).items()
     assert (joint, others) == ("hip", [])
     assert (left.size, left.share) == (sizes["hip"], pytest.approx(0.2))
     assert left.std < 0.05 * left.size
     assert not left.as_unsure
-    assert left_of(replace(held, kind=Kind.OTHER_PERIODS), gap, now.fit) == {}
+    assert left_of(bench, now, replace(held, kind=Kind.OTHER_PERIODS), gap) == {}
+
+
+def test_it_is_as_wide_as_parameters_are_told_to_be(rippled, laboratory, monkeypatch):
+    """Which is more than noise alone would have it where periods scatter, or where a shape is hardly known."""
+    bench, start, right = rippled
+    other = laboratory.bench(laboratory.record(motion=1))
+    held = replace(tried(other, Selection(start, right, 1, (1e-9,)), "other"), kind=Kind.OTHER_MOTION)
+    torque = torque_by_joint(other)
+    gap = Gap(torque, torque, dict.fromkeys(torque, 0.0))
+    plain = right.fit.unit**0.5 * np.linalg.norm(right.fit.covariance_factor, axis=1)
+    for times in (1.0, 3.0):
+        monkeypatch.setattr(foretold, "uncertainties", lambda *_, wide=times: wide * plain)
+        expected = foretold_std(other, right.fit, range(len(right.fit.effects)))
+        for joint, left in left_of(bench, right, held, gap).items():
+            assert left.std == pytest.approx(times * expected[joint])
+    # a parameter that nothing tells, or that is held, is as unsure as its covariance says
+    monkeypatch.setattr(foretold, "uncertainties", lambda *_: np.full(len(plain), np.inf))
+    assert left_of(bench, right, held, gap)["hip"].std == pytest.approx(expected["hip"])
 
 
 @pytest.mark.scenario
@@ -66,7 +85,7 @@ def test_an_order_that_a_small_motion_does_not_tell_is_told_from_a_change(labora
     final = settle(bench, (*bench.effects, make_effect("position_dependent_friction", "ankle", order=4.0)))
     there = small.bench(small.record([*planted, ("torque_offset", "ankle", [changed], {})], motion=1, periods=5))
     held = replace(tried(there, Selection(start, final, 1, (1e-9,)), "other"), kind=Kind.OTHER_MOTION)
-    left = left_of(held, gap_of(there, held.before, held.after, held.noise), final.fit)
+    left = left_of(bench, final, held, gap_of(there, held.before, held.after, held.noise))
     assert left["ankle"].share > 0.2
     assert left["ankle"].as_unsure is as_unsure
     assert left["ankle"].least_known == "position_dependent_friction at ankle"

@@ -5,11 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench.bench import Bench
 from sea_ident.discrepancy.bench.contribution import torque_factor
 from sea_ident.discrepancy.bench.fit import Fit
 from sea_ident.discrepancy.bench.gap import Gap, per_joint, torque_by_joint
+from sea_ident.discrepancy.bench.settle import Settled
 from sea_ident.discrepancy.compared.heldout import HeldOut, Kind
+from sea_ident.discrepancy.evidence.uncertainty import uncertainties
 
 FAR_BEYOND = 3.0
 """Times the noise from which on a gap on other data counts, ..."""
@@ -44,13 +47,14 @@ class Left:
         return self.size <= AS_UNSURE * self.std
 
 
-def left_of(held: HeldOut, gap: Gap, fit: Fit) -> dict[str, Left]:
+def left_of(bench: Bench, now: Settled, held: HeldOut, gap: Gap) -> dict[str, Left]:
     """What a model leaves of the torque of another recording, by joint, where that is far beyond noise.
 
     Args:
+        bench: the recording that it was found on.
+        now: the model.
         held: the other recording.
         gap: there.
-        fit: the model, as it was fitted to the recording that it was found on.
     """
     if held.kind is Kind.OTHER_PERIODS:
         return {}
@@ -60,8 +64,9 @@ def left_of(held: HeldOut, gap: Gap, fit: Fit) -> dict[str, Left]:
     far = [joint for joint in far if shares[joint] > BEYOND_THE_MOTION]
     if not far:
         return {}
-    whole = foretold_std(held.bench, fit, range(len(fit.effects)))
-    each = [foretold_std(held.bench, fit, [position]) for position in range(len(fit.effects))]
+    fit, wider = now.fit, _wider(bench, now)
+    whole = foretold_std(held.bench, fit, range(len(fit.effects)), wider)
+    each = [foretold_std(held.bench, fit, [position], wider) for position in range(len(fit.effects))]
     found = {}
     for joint in far:
         most = int(np.argmax([stds[joint] for stds in each]))
@@ -69,10 +74,17 @@ def left_of(held: HeldOut, gap: Gap, fit: Fit) -> dict[str, Left]:
     return found
 
 
-def foretold_std(bench: Bench, fit: Fit, positions: Sequence[int]) -> dict[str, float]:
+def foretold_std(bench: Bench, fit: Fit, positions: Sequence[int], wider: FloatArray | None = None) -> dict[str, float]:
     """Rms standard deviation of the torque of some effects of a fit on another motion, by joint [N m] or [N].
 
-    By the covariance of their parameters and shapes, to first order in these.
+    By the covariance of their parameters and shapes, to first order in these; `wider` as in `torque_factor`.
     """
-    factor = torque_factor(bench, fit, positions)
+    factor = torque_factor(bench, fit, positions, wider)
     return per_joint(bench, np.sum(np.abs(factor) ** 2, axis=(0, 2)))
+
+
+def _wider(bench: Bench, now: Settled) -> FloatArray:
+    """(p + s,) by how much more than noise alone would have it the parameters and shapes of a model are unsure [-]."""
+    told, plain = uncertainties(bench, now), np.linalg.norm(now.fit.covariance_factor, axis=1) * now.fit.unit**0.5
+    known = np.isfinite(told) & (plain > 0.0)
+    return np.asarray(np.divide(told, plain, out=np.ones_like(plain), where=known), dtype=np.float64)
