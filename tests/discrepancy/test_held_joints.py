@@ -69,6 +69,7 @@ def test_what_is_missing_beside_a_joint_that_is_held_is_told_by_the_others_alone
     assert any("Move every joint, or leave those out" in text for text in found.warnings)
 
 
+@pytest.mark.scenario
 def test_what_acts_in_no_sample_that_is_compared_stays_as_it_is_described(holding_laboratory):
     laboratory = holding_laboratory
     with pytest.warns(SeaIdentWarning, match="is the motor held"):

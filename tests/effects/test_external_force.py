@@ -58,7 +58,9 @@ def test_it_pushes_for_as_long_as_it_does_between_samples_too(start, stop):
     np.testing.assert_allclose(make_effect("external_force", "knee").share_of(time), 1.0)
 
 
-@pytest.mark.parametrize(("start", "stop"), [(0.1236, 0.3043), (0.1261, 0.3012)])
+@pytest.mark.parametrize(
+    ("start", "stop"), [(0.1236, 0.3043), pytest.param(0.1261, 0.3012, marks=pytest.mark.scenario)]
+)
 def test_a_simulation_hangs_on_no_step_that_an_edge_falls_into(start, stop):
     """Off by a millisecond, an edge would move the links by 1e-4 rad and more."""
     leg, series = sea_ident.load_robot("exo_leg"), FourierSeries(2.0, np.zeros(3), *np.full((2, 3, 1), 0.05))

@@ -167,6 +167,7 @@ def test_springs_identified_again_keep_them(leg, model, recording):
     np.testing.assert_allclose(again[1].terms[0].values, term(model, "knee").values, rtol=1e-6)
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize("name", ["spring_stiffness", "spring_damping", "spring_stiffening", "stiffness_drift"])
 def test_the_law_of_the_spring_and_its_drift_are_not_to_be_given(leg, recording, name):
     with pytest.raises(IdentificationError, match="leave it out"):

@@ -99,6 +99,7 @@ def test_single_file(designed, tmp_path, suffix):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.scenario
 def test_ends_at_rest_with_ramps(designed, tmp_path):
     write_trajectory_yaml(designed, tmp_path / "t.yaml")
     points = yaml.safe_load((tmp_path / "t.yaml").read_text(encoding="utf-8"))["points"]

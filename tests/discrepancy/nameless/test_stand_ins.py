@@ -45,6 +45,7 @@ def angle(nothing_missing):
     return away, float(away.max())
 
 
+@pytest.mark.scenario
 def test_what_changes_along_the_path_is_no_ripple(nothing_missing, angle):
     away, reach = angle
     spring = 2.0 * (away / reach) + 1.0 * (away / reach) ** 2 + 0.15 * np.sin(9.0 * away)
@@ -55,6 +56,7 @@ def test_what_changes_along_the_path_is_no_ripple(nothing_missing, angle):
     assert "nothing in it turns so slowly" in wave.sentence
 
 
+@pytest.mark.scenario
 def test_a_wave_of_which_the_motion_shows_but_a_part_keeps_its_name(nothing_missing, angle):
     """It ended as the longest too, but with nothing left beside it."""
     bench, selection = ripple_found(nothing_missing[0], np.sin(0.45 * angle[0] + 0.4), 0.5)
@@ -82,6 +84,7 @@ def quietly(function, *args):
         return function(*args)
 
 
+@pytest.mark.scenario
 def test_a_short_wave_keeps_its_name_where_something_else_is_missing(nothing_missing, angle):
     away, reach = angle
     bench, selection = ripple_found(nothing_missing[0], np.sin(12.0 * away) + (away / reach) ** 2, 12.0)

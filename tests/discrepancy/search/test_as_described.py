@@ -148,6 +148,7 @@ def test_the_friction_that_is_described_takes_no_place_from_others(described, mo
     assert found_in(search(bench, bench.effects, only)) == found_in(selection)
 
 
+@pytest.mark.scenario
 def test_what_is_described_has_no_price(described, laboratory):
     friction = make_effect("link_friction", "knee")
     there, elsewhere = (each.bench(each.record()) for each in (described, laboratory))

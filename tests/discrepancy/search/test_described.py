@@ -112,6 +112,7 @@ def test_large_errors_of_encoders_are_found_at_every_joint(laboratory, effect, s
         assert own.std < 0.01 * size
 
 
+@pytest.mark.scenario
 def test_the_wrong_side_of_zero_is_left_for_the_right_one(laboratory):
     bench = laboratory.bench(laboratory.record([("encoder_offset", "ankle", [], {"offset": 0.08})], periods=6))
     now = settle(bench, bench.effects)

@@ -43,6 +43,7 @@ def test_what_drifts_goes_with_its_values_and_has_the_size_of_its_torque(laborat
     assert [gap.before[joint] for joint in ("hip", "ankle")] == [0.0, 0.0]
 
 
+@pytest.mark.scenario
 def test_half_a_drift_leaves_the_other_half(laboratory):
     bench, fit = drifting(laboratory, 12)
     assert trend_gap(bench, fit, [trend(0.5 * RATE)]).shrink == pytest.approx(0.5, abs=0.03)
@@ -57,6 +58,7 @@ def test_what_goes_straight_on_is_there_whatever_course_is_named(laboratory):
     assert soon.after["knee"] == pytest.approx(straight.before["knee"], rel=0.05)
 
 
+@pytest.mark.scenario
 def test_noise_is_that_of_the_periods_and_of_every_course(laboratory):
     """Without a drift: as much of the scatter of one period as there are courses, over the root of their number."""
     bench = laboratory.bench(laboratory.record(periods=12))

@@ -21,6 +21,7 @@ def settled(laboratory):
     return bench, settle(bench, bench.effects).fit
 
 
+@pytest.mark.scenario
 def test_a_drift_is_none_in_the_mean_of_the_recording_and_has_the_smoothing_of_the_model(settled):
     bench, fit = settled
     (term,) = trend_terms(bench, fit, [trend("friction_drift", 0.1, 0.5, time_constant=30.0)])
@@ -31,6 +32,7 @@ def test_a_drift_is_none_in_the_mean_of_the_recording_and_has_the_smoothing_of_t
     assert term.effect.smoothing == coulomb.smoothing
 
 
+@pytest.mark.scenario
 def test_a_share_of_a_torque_that_drifts_itself_is_that_of_the_mean(settled):
     """Of what was recorded a share v w(t) is lost: of what is there in the mean it is (w(t) - w) v / (1 - v w)."""
     bench, fit = settled
@@ -49,6 +51,7 @@ def test_a_share_of_a_torque_that_drifts_itself_is_that_of_the_mean(settled):
     assert term.effect.coulomb == pytest.approx(fit.parameters["knee.coulomb_friction"])
 
 
+@pytest.mark.scenario
 def test_what_is_told_as_nothing_is_as_unsure_as_before(settled):
     bench, fit = settled
     found = Trend(make_effect("friction_drift", "knee"), np.array([0.0, 0.5]), np.array([0.1, 0.05]), 100.0, 1e-9, 0.02)
@@ -56,6 +59,7 @@ def test_what_is_told_as_nothing_is_as_unsure_as_before(settled):
     assert term.stds == (0.1, 0.05)
 
 
+@pytest.mark.scenario
 def test_friction_by_temperature_is_none_at_the_mean_temperature(settled):
     bench, fit = settled
     temperature = np.full((12, 3), 20.0) + np.linspace(0.0, 11.0, 12)[:, None]

@@ -43,6 +43,7 @@ def of_trends_alone(monkeypatch, *given):
         return within_periods(*given)
 
 
+@pytest.mark.scenario
 def test_a_drift_within_a_period_is_no_effect_of_its_own(softening, monkeypatch):
     """Stiffness that falls all the time is lower at the end of every period: that alone lies far beyond the noise."""
     bench, now = softening
