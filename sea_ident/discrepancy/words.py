@@ -367,7 +367,7 @@ def _opening(facts: Facts) -> str:
         case Verdict.SUSPECT if (part := _part(facts)) is not None:
             return (
                 f"Something is missing; it looks like {names}, but that holds on other data in part only: as it was "
-                f"found it explains {100 * part:.0f} % of what it could explain there."
+                f"found, and as unsure as that is, it explains {100 * part:.0f} % of what it could explain there."
             )
         case Verdict.SUSPECT:
             return f"Something is missing; it looks like {names}, but that does not hold on other data."

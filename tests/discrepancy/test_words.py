@@ -253,7 +253,8 @@ def test_what_is_left_of_two_joints_for_two_reasons_is_said_of_each():
 
 
 @pytest.mark.parametrize(
-    ("transfer", "said"), [(0.1, "does not hold"), (0.63, "in part only: as it was found it explains 63 %")]
+    ("transfer", "said"),
+    [(0.1, "does not hold"), (0.63, "as it was found, and as unsure as that is, it explains 63 %")],
 )
 def test_a_suspect_says_how_far_it_holds(transfer, said):
     found = facts(Verdict.SUSPECT)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sea_ident._typing import FloatArray
 from sea_ident.discrepancy.bench.bench import Bench
 from sea_ident.discrepancy.bench.columns import effect_key
 from sea_ident.discrepancy.bench.contribution import as_known, torque_factor
@@ -33,6 +34,9 @@ SPOILT = 0.25
 """Share from which on it may be what else is missing there that speaks against an effect, where that is more than the
 effect could explain: what would be best beside it is bent by that."""
 
+BY_CHANCE = 3.0
+"""Standard deviations by which parameters may be off, as they were found, without anything being wrong [-]."""
+
 UNDECIDED = 0.1
 """Share of what neither explains on the other motion that a difference between two must exceed [-]: something else is
 wrong there, and could lean to either."""
@@ -46,7 +50,8 @@ class Transfer:
     """How an effect does on data that were not used.
 
     Attributes:
-        share: of what it could explain there, what it does explain with its parameters as they are [-].
+        share: of what it could explain there, what it does explain with its parameters as they are, or where that is
+            little, as far as they were found to be unsure [-].
         tested: whether there was enough to explain to tell.
         statistic: weighted sum of squares that is left there with its parameters as they are.
         excess: what of it is beyond the noise.
@@ -189,24 +194,43 @@ class _Trial:
                 tested = self._tells(without, alone().statistic)
             share = max(share, self._share_beside_free(), self._share_by_values())
         possible = without.statistic - min(free.statistic, fixed.statistic)
+        if tested and share <= TRANSFERS_ALONE and possible > 0.0:
+            # an order that the first motion hardly tells is off by chance on a larger one, and the effect is right
+            most = without.statistic - fixed.statistic + self._within_its_deviations(fixed)
+            share = max(share, min(most / possible, 1.0))
         by_chance = self.by_chance(fixed)
         return Transfer(share, tested, fixed.statistic, unit, fixed.excess, remembers, possible, by_chance)
 
     def by_chance(self, fixed: Fit) -> float:
         """What of the statistic is likely chance, where the parameters are only as sure as the first motion made them.
 
-        A combination of parameters that it hardly tells may do much on another motion, and is off by chance. What could
-        be off by more explains more of what is left there, and pays for it by the logarithm of that.
+        What could be off by more explains more of what is left there, and pays for it by the logarithm of that.
 
         Args:
             fixed: the model with the effect as it was found.
         """
-        bench, unit = self._bench, self._now.fit.unit
+        left, stds = self._along_its_deviations(fixed)
+        sizes = stds**2 / self._now.fit.unit
+        return float(np.sum(left**2 * (sizes / (1.0 + sizes))) - self._now.fit.unit * np.sum(np.log1p(sizes)))
+
+    def _within_its_deviations(self, fixed: Fit) -> float:
+        """By how much the statistic falls where parameters go as far as they may be off by chance."""
+        left, stds = self._along_its_deviations(fixed)
+        return float(np.sum(left**2 - np.maximum(np.abs(left) - BY_CHANCE * stds, 0.0) ** 2))
+
+    def _along_its_deviations(self, fixed: Fit) -> tuple[FloatArray, FloatArray]:
+        """What is left along what parameters could do that are off, and the standard deviation of that, both (k,).
+
+        A combination of parameters that the first motion hardly tells may do much on another one, and is off by chance.
+
+        Args:
+            fixed: the model with the effect as it was found.
+        """
+        bench = self._bench
         factor = torque_factor(bench, self._fit, [self._position]) * fixed.scale[:, None]
-        rows = fixed.off(whiten(bench.whitener(self._now.noise), factor)) / np.sqrt(unit)
-        axes, sizes, _ = np.linalg.svd(rows, full_matrices=False)
-        taken = (axes.T @ fixed.whitened) ** 2 * (sizes**2 / (1.0 + sizes**2))
-        return float(np.sum(taken) - unit * np.sum(np.log1p(sizes**2)))
+        rows = fixed.off(whiten(bench.whitener(self._now.noise), factor))
+        axes, stds, _ = np.linalg.svd(rows, full_matrices=False)
+        return axes.T @ fixed.whitened, stds
 
     def _beside(self) -> list[Effect]:
         """What stands beside the torque of the others that is known: their signals, and what their springs remember."""

@@ -189,3 +189,17 @@ def test_what_is_hardly_known_pays_for_all_that_it_may_be(elsewhere):
     assert unsure > sure + 1.0
     # of two parameters and a shape, each a factor of 33
     assert vague - unsure == pytest.approx(2.0 * 3.0 * np.log(1e3 / 30.0), rel=0.2)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize(("off", "holds"), [(2.0, True), (10.0, False)])
+def test_an_effect_holds_elsewhere_within_three_deviations_of_what_it_was_found_to_be(elsewhere, off, holds):
+    """Off by what it is unsure by, an effect may be worse than none on another motion, and is right all the same."""
+    one = elsewhere(off, unsure=30.0)
+    fixed, _ = one.as_found()
+    left, stds = one._along_its_deviations(fixed)
+    assert np.all(np.abs(left) < 3.0 * stds) == holds
+    outcome = one.outcome()
+    assert outcome.tested
+    assert outcome.holds is holds
+    assert outcome.ruled_out is not holds
