@@ -114,6 +114,7 @@ def test_values_that_the_other_motion_would_have_as_well_hold_there(laboratory, 
     # and that counts where the comparison of statistics speaks against it
     monkeypatch.setattr(_Trial, "_share", staticmethod(lambda without, fixed, free: 0.0))
     monkeypatch.setattr(_Trial, "_share_beside_free", lambda self: 0.0)
+    monkeypatch.setattr(_Trial, "_within_its_deviations", lambda self, fixed: -np.inf)
     outcomes = [_Trial(other, fit, added, now, position).outcome() for position in added]
     assert [outcome.tested for outcome in outcomes] == [True, True, True]
     assert [outcome.share for outcome in outcomes] == [same, less, shaped]
