@@ -149,6 +149,7 @@ def test_simulate_writes_the_columns_that_identify_reads(chain):
     )
 
 
+@pytest.mark.scenario
 def test_simulate_takes_a_sampling_rate(chain, tmp_path):
     folder, _ = chain
     begin = ("simulate", "exo_leg", "--excitation", folder / "exc.json", "--periods", 1, "--out", tmp_path / "rec.csv")

@@ -129,6 +129,7 @@ def designed(tmp_path_factory):
     return file
 
 
+@pytest.mark.scenario
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 @pytest.mark.parametrize(
     "last_seen",

@@ -309,6 +309,7 @@ def test_a_stuck_motor_does_not_creep() -> None:
     assert np.ptp(exact.tau_motor, axis=0).min() > 0.1
 
 
+@pytest.mark.scenario
 @pytest.mark.parametrize(
     ("effect", "form", "joint"),
     [

@@ -178,6 +178,7 @@ def test_the_folder_of_a_case_holds_nothing_of_the_truth(tmp_path: Path) -> None
     assert Case.from_dict(json.loads(truth_file(tmp_path, case.label).read_text())) == case
 
 
+@pytest.mark.scenario
 def test_identify_is_held_against_the_truth_where_nothing_is_hidden(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -260,6 +260,7 @@ def test_information_that_is_there_already_turns_the_design_to_what_is_missing(e
     assert sequential.log_det == pytest.approx(np.linalg.slogdet(known + new)[1], abs=1e-6)
 
 
+@pytest.mark.scenario
 def test_noise_weights_count(exo, plain):
     """Twice the noise is a quarter of the information about each parameter; one noisy joint counts less."""
     double = design_excitation(exo, seed=0, noise=np.full(3, 2.0), **SMALL)
@@ -276,6 +277,7 @@ def test_noise_weights_count(exo, plain):
     assert value(noisy) >= value(plain) - 0.3
 
 
+@pytest.mark.scenario
 def test_spring_columns_gain_from_a_design_that_includes_them(exo, plain):
     """The ankle of the paper: its spring is hardly loaded by a design for the rigid model."""
     effects = (*base_effects(exo), *spring_effects(exo))
@@ -343,6 +345,7 @@ def test_deflection_limits(exo):
     assert "knee.spring_torque" in found.margins
 
 
+@pytest.mark.scenario
 def test_torque_that_gravity_alone_exceeds(exo):
     with pytest.raises(
         InfeasibleError, match=r"no position was found .* hip.torque: [\d.]+ N m, at most 0.5 N m. Widen"

@@ -45,7 +45,8 @@ def changed(laboratory, leg):
     return change
 
 
-@pytest.mark.parametrize("new", [MOTOR, pytest.param(CONSTANT, marks=pytest.mark.scenario)], ids=lambda e: e[0])
+@pytest.mark.scenario
+@pytest.mark.parametrize("new", [MOTOR, CONSTANT], ids=lambda e: e[0])
 def test_an_effect_that_is_new_changes_nothing_else(changed, new):
     assert not changed([], [new], [new]).changed
 
