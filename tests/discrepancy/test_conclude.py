@@ -16,16 +16,19 @@ from sea_ident.discrepancy import Verdict, searching
 from sea_ident.discrepancy.bench.gap import Gap
 from sea_ident.discrepancy.bench.lack import remainder_share
 from sea_ident.discrepancy.changing import Changing
+from sea_ident.discrepancy.compared.heldout import Kind, tried
 from sea_ident.discrepancy.conclude import (
     _known_better,
     _locations,
     beyond_the_library,
+    conclude,
     explains,
     goes_there,
     predicts,
     verdict_of,
     without_sizes,
 )
+from sea_ident.discrepancy.evidence.foretold import Left
 from sea_ident.discrepancy.evidence.locate import locate
 from sea_ident.discrepancy.measured.check import Findings
 from sea_ident.discrepancy.nameless.unnamed import Unnamed
@@ -153,6 +156,33 @@ def test_nothing_is_missing_and_yet_something_was_changed_before_the_motion_that
     assert told is not None
     assert float(told[1]) == pytest.approx(1.5, rel=0.1)  # beside reversals it is not counted
     assert any(text.endswith("Diagnose that one as well") for text in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "told"),
+    [
+        (Verdict.NONE, ["hip", "knee"]),
+        (Verdict.NAMED, ["hip", "knee"]),
+        (Verdict.AMBIGUOUS, ["hip", "knee"]),
+        (Verdict.SUSPECT, ["knee"]),
+        (Verdict.NOT_IN_LIBRARY, []),
+    ],
+)
+def test_what_is_left_of_another_motion_is_told_beside_every_verdict_with_a_model(
+    rippled, laboratory, monkeypatch, verdict, told
+):
+    """Of what is suspect it is said that it does not hold; told is but what the recording hardly tells."""
+    bench, start, final = rippled
+    left = {"hip": Left(2.0, 0.2, 0.1, "friction"), "knee": Left(1.5, 0.3, 1.0, "ripple")}
+    module = "sea_ident.discrepancy.conclude"
+    monkeypatch.setattr(f"{module}.left_of", lambda *_: left)
+    monkeypatch.setattr(f"{module}.verdict_of", lambda *_: verdict)
+    selection = Selection(start, final, 1, (1e-9,))
+    held = replace(tried(laboratory.bench(laboratory.record(motion=1)), selection, "other"), kind=Kind.OTHER_MOTION)
+    confirmed = Confirmed(selection, bench, start, final)
+    found = conclude(bench, confirmed, drifting(None), {}, held, None, Findings())
+    assert found.verdict is verdict
+    assert [joint for joint in left if re.search(rf"leaves [^:]* N m at {joint} \(", found.text)] == told
 
 
 def test_what_only_the_samples_near_reversals_show_has_its_place_there(rippled):
