@@ -4,6 +4,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ import pytest
 pytest.importorskip("mujoco", reason="the cases of the benchmark are drawn with MuJoCo")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from sea_ident import Model, identify
+from sea_ident import Model, identify, load_robot
+from sea_ident.discrepancy.search import one_for_two
+from sea_ident.effects import make_effect
 from tests.benchmarks.hidden_effects.case import Case, Planted
 from tests.benchmarks.hidden_effects.diagnose_case import without_effects
 from tests.benchmarks.hidden_effects.draw import draw_case, truth_of
@@ -215,6 +218,16 @@ def test_an_effect_can_be_taken_out_of_the_library() -> None:
         assert "torque_ripple" not in effects.effect_classes()
         assert "torque_offset" in effects.effect_classes()
     assert "torque_ripple" in effects.effect_classes()
+
+
+def test_two_zeros_are_not_made_one_that_is_taken_out() -> None:
+    """The zeros of a joint and of its motor are that of its encoder, which came back by that way."""
+    bench = SimpleNamespace(robot=load_robot("exo_leg"))
+    pair = make_effect("joint_offset", "knee", offset=0.1), make_effect("motor_encoder_offset", "knee", offset=-0.1)
+    for taken_out, found in (("encoder_offset", None), ("torque_ripple", "encoder_offset")):
+        with without_effects([taken_out]):
+            assert getattr(one_for_two.one_zero(bench, *pair, {}), "name", None) == found
+    assert one_for_two.one_zero(bench, *pair, {}).name == "encoder_offset"
 
 
 def test_wilson_interval_matches_the_published_example() -> None:
